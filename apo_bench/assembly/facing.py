@@ -1,4 +1,4 @@
-"""Faces of two solids that look at each other: how far apart, how far from parallel, how much they cover each other."""
+"""Candidate contacts of two posed solids: pairs of faces that face each other, with gap, tilt and overlap."""
 
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
@@ -20,12 +20,12 @@ from apo_bench.geometry import (
 
 
 def faces_oppose(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
-    """Whether two posed faces look at each other, their normals opposite within an angle."""
+    """Whether the normals of two posed faces are opposite within an angle."""
     return bool((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal) < -np.cos(angle_rad))
 
 
 def measure_height(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
-    """How far the middle of face a stands in front of the plane of face b, [m]; below 0 behind it."""
+    """The height of the centre of the corners of face a over the plane of face b, [m]; negative behind it."""
     n = T_b[:3, :3] @ b.normal
     return float((pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]) @ n)
 
@@ -41,12 +41,12 @@ def facing(
     share: float,
     known: Collection[tuple[str, str]] = (),
 ) -> Iterator[FacingPair]:
-    """All pairs of faces of two posed solids that might touch.
+    """Yield the pairs of faces of two posed solids that may be in contact.
 
     Args:
         T_a: World pose of the first solid, (4, 4), [m].
-        T_b: That of the second one.
-        gap_m: Pairs whose planes are farther apart in the middle of the overlap are left out.
+        T_b: World pose of the second one.
+        gap_m: Pairs with a larger gap are left out; it is measured at the middle of the overlap.
         angle_rad: Pairs whose normals are farther from opposite are left out.
         share: Pairs that cover less of the smaller face are left out.
         known: Pairs, by name, that need not be measured again.
@@ -72,7 +72,10 @@ def facing(
 
 
 def measure_face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
-    """From the middle of the overlap, on b, to the plane of a, [m]; from the middle of b where nothing overlaps."""
+    """The distance from the plane of a to the middle of the overlap on b, [m]; to the middle of b if nothing overlaps.
+
+    For round faces it is the gap of `measure_round`.
+    """
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
         return measure_round(a, T_a, b, T_b).gap_m
     common = compute_overlap(a, T_a, b, T_b)
@@ -81,23 +84,24 @@ def measure_face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: 
 
 
 class _Posed(NamedTuple):
-    """The faces of a solid in the world."""
+    """The flat faces of a solid in the world."""
 
     faces: tuple[Face, ...]
     normals: Array
-    """(f, 3)."""
+    """Outward unit normals, (f, 3)."""
     corners: list[Array]
     """The corners of each outline, (k, 3), [m]."""
 
 
 def _pose_faces(solid: Solid, T: Array) -> _Posed:
+    """The flat faces of a solid with pose T, (4, 4), in the world."""
     faces = tuple(solid.faces.values())
     normals = np.array([face.normal for face in faces]).reshape(-1, 3)
     return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])
 
 
 def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> FacingPair | None:
-    """What is measured of face i of one solid and face j of another; None if they cover too little of each other."""
+    """Measure face i of one solid against face j of another; None if they cover too little of each other."""
     face_a = a.faces[i]
     face_b = b.faces[j]
     n_a = a.normals[i]
@@ -130,6 +134,10 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
 
 
 def _axes(n: Array, R: Array) -> tuple[Array, Array]:
-    """Two unit vectors across n and each other; the first follows the axis of the part that is most across."""
+    """Two unit vectors perpendicular to the unit normal n and to each other; u is derived from a part axis.
+
+    Args:
+        R: Orientation of the part, (3, 3); the axis most nearly perpendicular to n gives u.
+    """
     u = find_direction_across(n, R[:, int(np.abs(n @ R).argmin())])
     return u, np.array([n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]])

@@ -1,8 +1,8 @@
-"""Pairs of faces of which at least one is round: how far off, how far askew, how much of each other they cover.
+"""Gap, tilt and overlap of two faces of which at least one is round, as residuals with derivatives.
 
-What is measured of a pair are as many numbers as its contact has equations (`apo_bench.assembly.projection`), lengths
-first: how far off an axis is, across the other one or in front of a plane, then how far a cone is from its seat; then
-tilts. A turn about the axis changes none of them, so it does not matter how a part of revolution was observed turned.
+The residuals of a pair are as many as its contact has equations (`apo_bench.assembly.projection`). Lengths come first:
+offsets across an axis or from a plane, then the distance of a cone from its seat. Tilts follow. A turn about the axis
+changes none of them, so it does not matter at which angle a part of revolution was observed.
 """
 
 from dataclasses import dataclass
@@ -16,42 +16,46 @@ from apo_bench.assembly.contact_kinds import classify_contact, compute_geometric
 from apo_bench.geometry import Array, Face, RoundFace, Solid, measure_angle, measure_mate, pose
 
 _TIGHTEST_M = -0.1e-3
+"""Least difference of the radii of a hole and a shaft that can make a contact, [m]; negative: the shaft is thicker."""
 _LOOSEST_M = 0.6e-3
-"""A hole whose radius is less larger than that of a shaft, or more, is not the one that the shaft is for."""
+"""Largest difference of the radii of a hole and a shaft that can make a contact, [m]."""
 _SAME_M = 1e-9
+"""Tolerance of equal radii, [m]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class FacingPair:
-    """Two faces that look at each other, one of which covers part of the other; of round ones axes count as normals."""
+    """Two faces that may be in contact, with residuals and their derivatives; axes of round faces count as normals."""
 
     a: str
     """The face of the first solid."""
     b: str
-    """The face of the second one."""
+    """The face of the second solid."""
     gap_m: float
-    """From the middle of the overlap, on b, to the plane of a: above 0 apart, below 0 inside each other; of round faces
-    how far walls are from where they should be."""
+    """Distance from the plane of a to the middle of the overlap on b: positive apart, negative inside each other. For a
+    shaft on a plane the height of the shaft; for other round faces the length of the offset, never negative."""
     angle_rad: float
-    """Between the normal of a and the opposite of that of b; between axes, or between an axis and a plane."""
+    """Angle between the normal of a and the opposite of that of b; or between axes, or between an axis and a plane."""
     share: float
-    """Area of the overlap over that of the smaller face, 0 to 1; what is common of the lengths of round faces over the
-    shorter one; of cones that of their radii."""
+    """Area of the overlap over that of the smaller face, 0 to 1. For round faces: common length over the shorter
+    length; for cones: common range of radii over the smaller range."""
     residual: Array
-    """(r,): lengths, [m], then tilts, [rad] while small: the gap and the parts of the normal of a along two axes in the
-    plane of b."""
+    """(r,): lengths, [m], then tilts, [rad] while small. For flat faces: the gap, then the components of the normal of
+    a along two axes in the plane of b."""
     slope: Array
-    """(r, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, b at rest."""
+    """(r, 6): derivative of `residual` by a twist (v, w) of the first solid, world, about the world origin, with b at
+    rest."""
     half_m: tuple[float, ...]
-    """Half the extent of the overlap across the axis of each tilt, so that a tilt about it opens it by as much."""
+    """For each tilt, the lever arm at which it opens the contact: half the extent of the overlap perpendicular to its
+    axis."""
     lengths: int = 1
-    """How many of the residuals are lengths; the others are tilts."""
+    """Number of residuals that are lengths; the others are tilts."""
 
 
 @lru_cache(maxsize=1024)
 def find_round_pairs(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
-    """The faces of two solids, at least one of them round, whose kinds and sizes can make a contact."""
+    """All pairs of faces of two solids, at least one of each round, whose kinds and radii can make a contact."""
     every: list[list[Face | RoundFace]] = [[*solid.faces.values(), *solid.rounds.values()] for solid in (a, b)]
     return tuple(
         (face, other)
@@ -69,6 +73,7 @@ def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Arr
 
 
 def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> FacingPair:
+    """Measure a shaft on a plane, in either order: the mean height, and the tilt of the axis."""
     (shaft, T_shaft), (flat, T_flat) = ((b, T_b), (a, T_a)) if isinstance(a, Face) else ((a, T_a), (b, T_b))
     assert isinstance(shaft, RoundFace)
     assert isinstance(flat, Face)
@@ -94,11 +99,11 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
 
 
 def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
-    """A cylinder in a cylinder."""
+    """Measure a cylinder in a cylinder, in either order: two offsets across the axis of b, and two tilts."""
     touch = measure_mate(a, T_a, b, T_b)
     u = T_a[:3, :3] @ a.axis
     w = T_b[:3, :3] @ b.axis
-    u = u if u @ w > 0.0 else -u
+    u = u if u @ w > 0.0 else -u  # axes of cylinders have no sense
     across = (T_b[:3, :3] @ b.frame[:3, :2]).T
     p = touch.points.mean(axis=0)
     off = across @ touch.off.mean(axis=0)
@@ -117,7 +122,10 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
 
 
 def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
-    """A cone in a cone, or on a rim, compared where both have one radius."""
+    """Measure a cone in a cone, or on a rim: two offsets across the axis, the distance from the seat, and tilts.
+
+    The two are compared at the points of their axes where both have the same radius, in the middle of the common range.
+    """
     u = T_a[:3, :3] @ a.wider
     w = T_b[:3, :3] @ b.wider
     across = (T_b[:3, :3] @ b.frame[:3, :2]).T
@@ -126,7 +134,7 @@ def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
     low = max(min(a.radii), min(b.radii))
     high = min(max(a.radii), max(b.radii))
     p, q = (pose.apply(T, face.where_wide((low + high) / 2)[None])[0] for face, T in ((a, T_a), (b, T_b)))
-    tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across
+    tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across  # a rim is a circle and may tilt
     spans = [abs(float(np.subtract(*face.radii))) for face in (a, b) if face.kind == "cone"]
     common = (high - low) / min(spans) if len(spans) == 2 else float(high >= low - _SAME_M)
     return FacingPair(
@@ -143,10 +151,10 @@ def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
 
 
 def _offsets(rows: Array, p: Array) -> Array:
-    """Derivatives, (r, 6), of how far a point of the first solid is off along directions, (r, 3)."""
+    """Derivatives, (r, 6), of the coordinates of a point p of the first solid along directions, (r, 3)."""
     return np.hstack([rows, np.cross(p, rows)])
 
 
 def _tilts(rows: Array, u: Array) -> Array:
-    """Derivatives, (r, 6), of the parts of an axis of the first solid along directions, (r, 3)."""
+    """Derivatives, (r, 6), of the components of an axis u of the first solid along directions, (r, 3), by its twist."""
     return np.hstack([np.zeros((len(rows), 3)), np.cross(u, rows)])

@@ -1,8 +1,8 @@
-"""How far faces of two parts that fit can come apart, if no other face that the two have in contact is in its way.
+"""Largest gap of a fit contact when parts use all their play together, as a linear program over small motions.
 
-A face that recedes lets a part sink or shift, which may open others by more than they recede themselves: a slide in a
-dovetail that lies on a receded floor has more room between its leaning walls. What a small motion opens is linear in
-it, so the largest gap is that of a linear program.
+A fit face that recedes lets a part sink or shift, which may open other contacts by more than they recede themselves.
+For example, a slide in a dovetail that lies on a receded floor has more room between its leaning walls. The gap that a
+small motion opens is linear in the motion.
 """
 
 from collections.abc import Iterator
@@ -29,42 +29,45 @@ from apo_bench.geometry import (
 )
 
 _WALLS = 16
-"""Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
+"""Directions in which a hole stops its shaft: a polygon of so many walls, its corners on the circle of play."""
 _LEVER_MM = 30.0
-"""Turns count as the way at this distance, so that all unknowns of the linear program are of one size."""
+"""Lever arm that turns rotations into lengths, so that all unknowns of the linear program have one scale."""
 _DIGITS = 6
-"""Of a play in mm; what a program leaves behind them is rounding."""
+"""Digits of a play in mm that are kept; further ones are rounding of the linear program."""
 _ALONG = 1e-9
-"""Opening by a motion of size 1, in the units of the rows, that counts as none."""
+"""Opening by a motion of size 1, in the units of the rows, up to which the motion counts as parallel to the face."""
 _ROUND_M = 9
-"""Digits of a pose [m] that distinguish two layouts apart."""
+"""Decimal digits of a pose, [m], that distinguish two layouts in the cache."""
 
 AnyFace = Face | RoundFace
 
 
 class _Touch(NamedTuple):
-    """Where a contact touches, in the frame of the part that rests."""
+    """The points at which one contact touches, in the frame of the part that rests."""
 
     points: Array
-    """(k, 3), [m]."""
+    """Contact points, (k, 3), [m]."""
     normals: Array
-    """Out of the resting face, unit length, (k, 3)."""
+    """Unit normal out of the resting face at each point, (k, 3)."""
     limit_mm: float
-    """How deep the other face may come at each."""
+    """How deep the other face may come at each point: the play."""
 
 
 def compute_joint_play_mm(
     assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float
 ) -> float | None:
-    """How far apart a corner of a flat fit contact, or the end of a shaft on a plane, can be at most, [mm].
+    """The largest gap between two fit faces, one of them flat, when the pair of parts uses all its play, [mm].
 
-    All contacts count that the same operation makes between the same two parts: none of them gets deeper than its own
-    play. None where they leave the gap without bound, where there is no other contact, where the faces do not fit, of
-    shafts in holes, which are bounded by their own play, and where the two parts touch at cones.
+    The gap is that at a corner of the common area of flat faces, or at an end of a shaft on a plane. All contacts count
+    that the same operation makes between the same two parts: none of them may get deeper than its own play.
 
     Args:
         made: The operation that makes the contact, counted from 0.
         true: The poses when it is made, world frame, [m].
+
+    Returns:
+        None if the gap is unbounded, there is no other contact, the faces do not fit, or the two parts touch at cones.
+        None also for shafts in holes, which are bounded by their own play.
     """
     moved, rests = (end.part for end in contact)
     together = [
@@ -74,6 +77,7 @@ def compute_joint_play_mm(
     ]
     if len(together) < 2 or not assembly.is_fit(contact):
         return None
+    # The moved part first in each pair, whichever was manipulated.
     pairs = [each if each.manipulated.part == moved else Contact(*each[::-1]) for each in together]
     T = np.round(pose.inverse(true[rests]) @ true[moved], _ROUND_M) + 0.0
     faces = tuple((assembly.face_of(m), assembly.face_of(e)) for m, e in pairs)
@@ -83,7 +87,12 @@ def compute_joint_play_mm(
 def compute_deep_limit_mm(
     assembly: Assembly, contact: Contact, clearance_mm: float, margin_mm: float, touching_mm: float
 ) -> float:
-    """How deep faces may be in each other: the play of the pair and a margin, or what faces that should touch may."""
+    """How deep faces may be in each other, [mm].
+
+    Args:
+        margin_mm: Allowed beyond the play of faces that go into one another.
+        touching_mm: Allowed for faces that only touch.
+    """
     a, b = map(assembly.face_of, contact)
     play = compute_play_mm(a, b, clearance_mm)
     return touching_mm if play is None else play + margin_mm
@@ -98,13 +107,12 @@ def compute_apart_limit_mm(
     margin_mm: float,
     touching_mm: float,
 ) -> float:
-    """How far apart faces may be: as deep as in `compute_deep_limit_mm`, or the play of all faces together and a
-    margin, if that is more.
+    """How far apart faces may be, [mm]: the larger one of `compute_deep_limit_mm` and the joint play plus a margin.
 
     Args:
-        made: As in `compute_joint_play_mm`, and so is `true`.
-        margin_mm: What is allowed beyond the play.
-        touching_mm: What faces that should touch may be off.
+        made, true: As in `compute_joint_play_mm`.
+        margin_mm: Allowed beyond the play.
+        touching_mm: Allowed for faces that only touch.
     """
     deep = compute_deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
     play = compute_joint_play_mm(assembly, contact, made, true, clearance_mm)
@@ -113,7 +121,15 @@ def compute_apart_limit_mm(
 
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
-    """The largest gap of one of some pairs of faces, [mm]; kept, since all trials of a seed share the true ones."""
+    """The largest gap of one pair of faces, [mm]; None as in `compute_joint_play_mm`.
+
+    Results are cached, since all trials of a seed share the true poses.
+
+    Args:
+        faces: All pairs of faces, each that of the moved part first.
+        which: The number of the pair asked for.
+        at: Pose of the moved part in the frame of the resting one, (4, 4), as bytes, so that it can be a key.
+    """
     if not {classify_contact(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
     if classify_contact(*faces[which]) == "shaft in hole":
@@ -127,9 +143,11 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, 
 def _touch_rows(
     faces: tuple[tuple[AnyFace, AnyFace], ...], at: bytes, clearance_mm: float
 ) -> tuple[Array, Array, NDArray[np.intp]]:
-    """By how much motions (v [mm], w [mm at the lever]) open pairs of faces at each point where they touch, (k, 6).
+    """All contact points as rows of the linear program.
 
-    Also how deep each point may come, (k,), [mm], and the pair that it belongs to, (k,).
+    Returns:
+        By how much motions (v [mm], w [mm at the lever]) open the contact at each point, (k, 6); how deep each point
+        may come, (k,), [mm]; the number of the pair that each belongs to, (k,).
     """
     T = np.frombuffer(at).reshape(4, 4)
     flat = [FacePair(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]
@@ -144,20 +162,23 @@ def _touch_rows(
 
 
 def _widest(own: Array, rows: Array, limits: Array) -> float:
-    """The most that a motion opens by one of its own rows, (k, 6), if no row closes by more than its limit; infinite
-    if one has no bound.
+    """The most that a motion opens one of its own rows if no row closes by more than its limit, [mm]; inf if unbounded.
 
-    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves; none
-    where a shift along a normal is without bound, or opens as much as rows that are opposite allow at most.
+    All own rows share one linear program, each with its own motion, since a call takes longer than what it solves. Two
+    cases need no program: a shift along a normal is unbounded, or it opens as much as an opposite row allows at most.
+
+    Args:
+        own: Rows of the pair asked for, (k, 6).
+        rows, limits: Rows of all pairs, (m, 6), and how far each may close, (m,), [mm].
     """
     from scipy.optimize import linprog
 
     if not len(own):
         return np.inf
-    # A shift along a normal goes on until the first row is at its limit.
+    # A shift along the normal of each own row goes on until the first row is at its limit.
     rates = -rows[:, :3] @ own[:, :3].T
     shift = np.where(rates > _ALONG, limits[:, None] / np.maximum(rates, _ALONG), np.inf).min(axis=0).max()
-    # No motion opens an own row by more than the limit of a row that is its opposite.
+    # Upper bound: no motion opens an own row by more than the limit of a row that is its opposite.
     faced = (np.abs(rows[:, None] + own) < _ALONG).all(axis=2)
     if shift >= np.where(faced, limits[:, None], np.inf).min(axis=0).max():
         return float(shift)
@@ -169,11 +190,13 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
 
 
 def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, common: Iterator[Overlap]) -> _Touch:
-    """Where two faces touch.
+    """The contact points of two faces.
 
     Args:
-        T: The pose of the part that moves in the frame of the one that rests.
-        common: Gives the overlap, if both are flat.
+        moved: The face of the part that moves.
+        rests: The face of the part that rests.
+        T: The pose of the part that moves in the frame of the one that rests, (4, 4), [m].
+        common: Yields the overlap of the next pair of flat faces; advanced only if both faces are flat.
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):

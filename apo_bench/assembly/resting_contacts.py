@@ -1,8 +1,8 @@
-"""The contacts of what moves with what rests, as normals and points in space.
+"""Contacts between moving and resting parts as unit normals and contact points in the world.
 
-A flat contact has one normal. Round walls have many; a few stand for all of them, which is enough to state where a part
-may be shifted: of a shaft in a hole one every 90 degrees around the axis, of a part of a wall those at both ends of its
-arc and between them. A cone counts as a shaft in a hole with a bottom: it leaves along the axis.
+A flat contact has one normal. A few normals stand for those of round walls, which is enough to tell in which directions
+a part can be shifted. For a shaft in a hole there is one every 90 degrees; for an arc there is one at both ends and
+some between. A cone counts as a shaft in a hole with a bottom: it leaves along the axis.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,25 +24,33 @@ from apo_bench.geometry import (
 )
 
 _QUARTER = np.pi / 2
+"""Largest angle between neighbouring normals of an arc, [rad]."""
 _RING = 2 * np.pi * np.arange(16) / 16
+"""Angles of the points that stand for a circle, [rad]."""
 
 
 class TouchedContact(NamedTuple):
-    """A contact, or one normal of a round one, seen from the part that moves."""
+    """A contact with one normal; a round contact gives several."""
 
     contact: Contact
     rests: str
     """The part that rests."""
     normal: Array
-    """From the resting face into the free side, unit length, (3,), world."""
+    """From the resting face towards the free side, unit vector, (3,), world."""
     points: Array | None = None
-    """Where round faces touch so, (k, 3), world, [m]; None of flat ones, which touch where they overlap."""
+    """Contact points of round faces for this normal, (k, 3), world, [m]; None for flat faces, which touch where they
+    overlap."""
 
 
 def find_touched_contacts(
     assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
 ) -> list[TouchedContact]:
-    """The contacts between a part that moves and a part that rests, round ones once for each normal."""
+    """The contacts between a part that moves and a part that rests, one entry per normal.
+
+    Args:
+        moves: The parts that move; every other one rests.
+        poses: World poses of the parts, [m].
+    """
     moving = set(moves)
     touches = []
     for contact in contacts:
@@ -55,11 +63,12 @@ def find_touched_contacts(
 def find_touch_points(
     assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: Meetings | None = None
 ) -> tuple[Array, Array]:
-    """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
-    at each, (k, 3).
+    """The points at which contacts touch, (k, 3), world, [m], and the normal at each, (k, 3).
+
+    For flat contacts these are the corners of the overlap.
 
     Args:
-        known: What is measured already.
+        known: Measurements to reuse.
     """
     every = list(touched)
     flat = iter(
@@ -72,7 +81,7 @@ def find_touch_points(
 
 
 def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
-    """Points that a face reaches to, (k, 3), world, [m]: its corners, or rings at both ends of a round one."""
+    """Points on the outline of a face, (k, 3), world, [m]: its corners, or circles at both ends of a round face."""
     face = assembly.face_of(of)
     T = poses[of.part]
     if isinstance(face, Face):
@@ -82,12 +91,19 @@ def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array
 
 
 def measure_entrance_depth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
-    """How far before its place on a way a face comes to where another one begins, [m]."""
+    """How far the moved face has to go along `way`, from first contact in that direction to its place, [m].
+
+    It is the greatest coordinate of the moved face minus the least coordinate of the resting one.
+
+    Args:
+        way: The unit vector of the motion, (3,), world.
+    """
     ahead, before = (list_outline_points(assembly, of, poses) @ way for of in (moved, rests))
     return float(ahead.max() - before.min())
 
 
 def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses) -> Iterator[TouchedContact]:
+    """Yield one entry for each normal of a contact; `rests` is the face of the resting part."""
     m, e = contact
     other = m if rests == e else e
     still = assembly.face_of(rests)
@@ -108,10 +124,13 @@ def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses:
 
 
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
-    """The normals of two round faces, and where each acts: off the wall at both ends of what the faces have in common,
-    and, where cones meet or a rim, out along the axis."""
+    """Yield the normals that stand for a contact of two round faces, and the points at which each acts, world.
+
+    Normals, (3,), point out of the resting wall and act at both ends of the common length, (k, 3), [m]. Cones and rims
+    have one more normal, along the axis, in the direction in which the moved part leaves.
+    """
     kind = classify_contact(still, moved)
-    out = -1.0 if still.hole else 1.0
+    out = -1.0 if still.hole else 1.0  # the free side of a hole is towards the axis, that of a shaft away from it
     axis = T[:3, :3] @ still.axis
     at = pose.apply(T, still.ends)
     if kind == "cone on rim":
@@ -128,7 +147,10 @@ def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Ite
 
 
 def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[Array]:
-    """From the axis to the walls, unit vectors, (3,), world: of the shorter arc; of whole turns along the world."""
+    """Unit vectors from the axis to the wall, (3,), world, on the shorter arc of two round faces.
+
+    If both are whole turns: four directions, 90 degrees apart, aligned with the world, not with the part.
+    """
     face, T = min((still, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
     if face.extent_rad >= WHOLE_TURN - 1e-9:
         z = T[:3, :3] @ face.axis

@@ -41,9 +41,9 @@ def plan_command(
         Path | None,
         make_path_option("Base, flange and order of quaternions of --robot: .toml; default: base, tip, xyzw."),
     ] = None,
-    probing: Annotated[
+    ft_sensor: Annotated[
         str | None,
-        typer.Option(metavar="FT_SENSOR", help="Write also the probing motions for this sensor into --robot."),
+        typer.Option(help="Write also the probing motions for this sensor into --robot."),
     ] = None,
     arm: Annotated[str | None, typer.Option(help="Check whether this arm can execute the plan.")] = None,
     as_json: AsJson = False,
@@ -62,7 +62,7 @@ def plan_command(
     check_output(robot, "--robot", ".json")
     belongs = {"--method": method, "--deviation-mm": deviation_mm, "--deviation-deg": deviation_deg, "--robot": robot}
     _require_with("--observation", observation, belongs)
-    _require_with("--robot", robot, {"--frames": frames, "--probing": probing})
+    _require_with("--robot", robot, {"--frames": frames, "--ft-sensor": ft_sensor})
     notes: list[str] = []
     predicted_success = None
     if observation is None:
@@ -90,12 +90,12 @@ def plan_command(
     lines = plan_lines(plan, task)
     if robot is not None:
         form = robot_form(lines, plan, task, robot_frames, notes)
-        if probing is not None:
+        if ft_sensor is not None:
             from apo_bench import build_scene
             from apo_bench.viz.probing_form import probing_form
 
             scene = build_scene(task, arm=arm or SETTINGS["arm"].default)
-            form["probing"] = probing_form(plan, scene, robot_frames, probing)
+            form["probing"] = probing_form(plan, scene, robot_frames, ft_sensor)
         write_form(form, robot)
     if as_json:
         print_json(describe_plan(lines, task, notes) | {"predicted_success": predicted_success})

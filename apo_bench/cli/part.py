@@ -90,7 +90,7 @@ def part_export(
         float | None,
         typer.Option(min=0.0, max=5.0, help="Clearance of your printer, per side, in mm; default: as the scenario."),
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, max=1000, help="Trials in the form.")] = 20,
+    form_trials: Annotated[int, typer.Option(min=1, max=1000, help="Number of trials in the form.")] = 20,
     method: Annotated[list[str] | None, typer.Option(help="Method to name in the form; may be repeated.")] = None,
     step_files: Annotated[
         bool, typer.Option("--step-files", help="Write STEP files as well; needs the extra cad.")
@@ -100,7 +100,7 @@ def part_export(
 
     Examples:
       apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
-      apo-bench part export pocket_table --step-files --trials 30 --method uncorrected --method contact --out kit
+      apo-bench part export pocket_table --step-files --form-trials 30 --method uncorrected --method contact --out kit
     """
     from apo_bench.formats.kit import write_kit
     from apo_bench.scenario import load_scenario
@@ -108,7 +108,7 @@ def part_export(
     task = load_scenario(scenario)
     clearance = task.clearance_mm if clearance_mm is None else clearance_mm
     with name_write_errors(f"--out {out}"):
-        files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], trials, step_files)
+        files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], form_trials, step_files)
     for file, count in files.items():
         typer.echo(f"{file}: print {count}")
     typer.echo(f"{out / 'tags.csv'}: where tags lie on the plate; {out / 'form.csv'}: fill in, one line a trial")

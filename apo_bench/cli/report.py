@@ -11,20 +11,20 @@ from apo_bench.io import clean, has_parquet
 
 def report_command(
     folder: Annotated[Path, make_path_argument("FOLDER", "Folder that `sweep --out` wrote.")],
-    pictures: Annotated[int, typer.Option(min=0, max=100, help="Largest number of failures to draw.")] = 6,
+    max_pictures: Annotated[int, typer.Option(min=0, max=100, help="Largest number of failures to draw.")] = 6,
 ) -> None:
     """Write report.html, which opens offline, with tables (CSV, Parquet) and figures (SVG, PNG).
 
     Examples:
       apo-bench report runs/mine
-      apo-bench report runs/mine --pictures 0
+      apo-bench report runs/mine --max-pictures 0
     """
     from apo_bench.benchmark.report.report import report
     from apo_bench.benchmark.report.tables.methods import prediction_summary
     from apo_bench.cli.rates import print_rates
     from apo_bench.viz.failure_pictures import failure_pictures
 
-    made = report(folder, pictures, failure_pictures)
+    made = report(folder, max_pictures, failure_pictures)
     print_rates(made.conditions)
     endings = ".csv and .parquet" if has_parquet() else ".csv (.parquet needs the package pyarrow)"
     lines = [

@@ -1,1 +1,1 @@
-"""File formats of observations and plans."""
+"""Read and write the file formats of observations, plans, pose estimates and robot frames."""

@@ -1,6 +1,6 @@
-"""Pose estimates in the results format of the BOP benchmark.
+"""Read pose estimates in the results format of the BOP benchmark.
 
-The first line is `scene_id,im_id,obj_id,score,R,t,time`; R is nine numbers row by row and t three, with spaces between.
+The first line is `scene_id,im_id,obj_id,score,R,t,time`. R is nine numbers row by row, t is three, separated by spaces.
 """
 
 from array import array
@@ -15,45 +15,45 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import open_file
 
-_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
+_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")  # the first line of a results file
 _NUMBERS = 14
-"""Score, R, t and time."""
-LARGEST_ID = 2**31 - 1
-LARGEST_MM = 1e6
+"""Numbers of score (1), R (9), t (3) and time (1)."""
+LARGEST_ID = 2**31 - 1  # of a scene, an image or an object
+LARGEST_MM = 1e6  # of any number but the ids
 _NOT_A_ROTATION = 0.02
-"""R R^t may be so far from the identity: published truth is rounded, that of LM-O by 0.0096."""
+"""Largest element of R R^t - I: published truth is rounded, that of LM-O by 0.0096."""
 _METRES = 20.0
-"""Parts whose median distance to the camera is less than this, in mm, were surely given in metres."""
+"""If the median distance to the camera in mm is below this, the file is in metres."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PoseRows:
-    """Parts in images, one row for each."""
+    """Poses of objects in images, one row each."""
 
     file: str
     where: NDArray[np.int64]
-    """(n, 3): scene, image, object."""
+    """(n, 3), integers: scene, image, object."""
     R: Array
-    """(n, 3, 3), camera from model, as written: nearly rotations."""
+    """(n, 3, 3), camera from model, as written: rotations up to rounding."""
     t_mm: Array
-    """(n, 3), camera from model, axes of OpenCV."""
+    """(n, 3), camera from model, OpenCV axes, [mm]."""
     place: NDArray[Any]
-    """Where each row stands in the file: the line, or the entry of a JSON document."""
+    """(n,), location of each row in the file: the line number, or the entry of a JSON document."""
     score: Array
-    """(n,), of the estimator; NaN where the file has none."""
+    """(n,), score of the estimator; NaN where the file has none."""
 
     def spot(self, row: int) -> str:
-        """Where a row stands, for messages."""
+        """Return the location of a row, for messages."""
         place = self.place[row]
         return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
 
 
 def read_results(path: str | Path) -> PoseRows:
-    """The rows of a results file; times are checked and not kept.
+    """Read the rows of a results file; times are checked and dropped.
 
     Raises:
-        InputError: Anything that is not as described, with the line where it stands.
+        InputError: The file deviates from the format; the message names the line.
     """
     numbers = array("d")
     with open_file(path, "CSV file") as stream:
@@ -66,7 +66,7 @@ def read_results(path: str | Path) -> PoseRows:
             elif text:
                 numbers.extend((line, *_row(text, place)))
     require(numbers, f"{path}: no pose stands in the file; give a first line {','.join(_COLUMNS)}, and rows below it.")
-    # Line, scene, image, object, score, R row by row, t, time: whole numbers of so many digits are exact.
+    # Columns: line, scene, image, object, score, R row by row, t, time. Integers of this size are exact in float64.
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 4 + _NUMBERS)
     whole = cells[:, :4].astype(np.int64)
     R = cells[:, 5:14].reshape(-1, 3, 3)
@@ -74,10 +74,10 @@ def read_results(path: str | Path) -> PoseRows:
 
 
 def check_rows(rows: PoseRows) -> PoseRows:
-    """The rows, once every pose in them makes sense.
+    """Return the rows if every pose is plausible.
 
     Raises:
-        InputError: One is no rotation, the unit is not mm, or a row stands twice.
+        InputError: A matrix is no rotation, the unit is not mm, or a row is repeated.
     """
     square = np.abs(rows.R @ np.swapaxes(rows.R, 1, 2) - np.eye(3)).max(axis=(1, 2))
     wrong = (square > _NOT_A_ROTATION) | (np.linalg.det(rows.R) < 0.0)
@@ -99,7 +99,12 @@ def check_rows(rows: PoseRows) -> PoseRows:
 
 
 def _row(text: str, place: str) -> list[float]:
-    """Scene, image, object, score, the twelve numbers of R and t, and the time."""
+    """Return scene, image, object, score, the twelve numbers of R and t, and the time of one line.
+
+    Args:
+        text: The line.
+        place: Its location, for messages.
+    """
     cells = text.split(",")
     require(len(cells) == len(_COLUMNS), f"{place}: {len(_COLUMNS)} cells are needed, {len(cells)} were given.")
     try:

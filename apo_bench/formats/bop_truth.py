@@ -1,4 +1,4 @@
-"""Ground truth of pose estimates: a results file, or `scene_gt.json` of the BOP format."""
+"""Read the ground truth of pose estimates: a results file, or `scene_gt.json` of the BOP format."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,14 +13,15 @@ from apo_bench.formats.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, 
 from apo_bench.io import convert_typed, read_typed
 
 LARGEST_TRUTH_BYTES = 64_000_000
-"""A scene of a video in the BOP format has up to some 20 MB."""
+"""A scene of a video in BOP format takes up to about 20 MB."""
 _Number = Annotated[float, Meta(ge=-LARGEST_MM, le=LARGEST_MM)]
 _Three = tuple[_Number, _Number, _Number]
+# A rotation matrix, row by row.
 _Nine = tuple[_Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number]
 
 
 class TruthEntry(msgspec.Struct, frozen=True):
-    """Where an object is in an image; other keys than these are not read."""
+    """The pose of an object in an image; other keys are ignored."""
 
     obj_id: Annotated[int, Meta(ge=0, le=LARGEST_ID)]
     cam_R_m2c: _Nine
@@ -28,18 +29,17 @@ class TruthEntry(msgspec.Struct, frozen=True):
 
 
 def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) -> PoseRows:
-    """The truth that estimates are compared with.
+    """Return the ground truth with which estimates are compared.
 
-    A `.json` file holds one scene, and does not name it: it is `scene`, else the number of its folder, else the only
-    scene that was estimated. It holds all images of that scene, so those with no estimate at all are left out, as they
-    were probably not asked for. A folder holds scenes, as `000001/scene_gt.json`. Every row of a `.csv` file was asked
-    for.
+    A `.json` file holds one scene without naming it: `scene`, else the number of its folder, else the only estimated
+    scene. It holds all images of the scene; images without any estimate are left out, as they were probably not
+    requested. A folder holds scenes as `000001/scene_gt.json`. All rows of a `.csv` file count.
 
     Args:
-        scene: Only this one.
+        scene: The only scene to compare; None: all.
 
     Raises:
-        InputError: Anything that is not as described; no image of the truth has an estimate.
+        InputError: A file deviates from its format, or no image of the truth has an estimate.
     """
     path = Path(path)
     is_results = path.suffix.lower() == ".csv"
@@ -50,7 +50,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
     else:
         scene = _which_scene(path, estimates) if scene is None else scene
         truth = _read_scene(path, scene)
-    kept = truth.where[:, 0] == (truth.where[:, 0] if scene is None else scene)
+    kept = truth.where[:, 0] == (truth.where[:, 0] if scene is None else scene)  # all rows if no scene is given
     estimated = kept & _among(truth.where[:, :2], estimates.where[:, :2])
     require(
         estimated.any(),
@@ -58,7 +58,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
         f"{estimates.file}; give the truth of the images that were estimated.",
     )
     truth = _only(truth, kept if is_results else estimated)
-    nearest = int(np.argmin(truth.t_mm[:, 2]))
+    nearest = int(np.argmin(truth.t_mm[:, 2]))  # the row with the least depth
     require(
         truth.t_mm[nearest, 2] > 0.0,
         f"{truth.spot(nearest)}, t: the third number is the depth before the camera and must be above 0.",
@@ -67,17 +67,18 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
 
 
 def _only(rows: PoseRows, kept: Any) -> PoseRows:
-    """The rows of a mask."""
+    """Return the rows that a mask (n,) selects."""
     return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
 
 
 def _among(where: Any, known: Any) -> Any:
-    """Whether each pair (n, 2) is one of the known, -> (n,)."""
-    size = LARGEST_ID + 1
+    """Return which scene-image pairs, (n, 2), are among known ones, (m, 2), as a mask (n,)."""
+    size = LARGEST_ID + 1  # joins scene and image into one number
     return np.isin(where[:, 0] * size + where[:, 1], known[:, 0] * size + known[:, 1])
 
 
 def _which_scene(path: Path, estimates: PoseRows) -> int:
+    """Return the scene of a `.json` file: the number of its folder, else the only estimated scene."""
     folder = path.resolve().parent.name
     if _is_number(folder):
         return int(folder)
@@ -92,7 +93,7 @@ def _which_scene(path: Path, estimates: PoseRows) -> int:
 
 
 def _read_folder(path: Path, scene: int | None) -> PoseRows:
-    """The truth of all scenes in a folder, or of one of them."""
+    """Return the ground truth of all scenes in a folder, or of one of them."""
     found = [file for file in sorted(path.glob("*/scene_gt.json")) if _is_number(file.parent.name)]
     files = [file for file in found if scene in (None, int(file.parent.name))]
     require(
@@ -112,11 +113,12 @@ def _read_folder(path: Path, scene: int | None) -> PoseRows:
 
 
 def _is_number(name: str) -> bool:
-    """Whether a folder is named by the number of its scene."""
+    """Whether the name of a folder or a key is a number."""
     return name.isascii() and name.isdigit() and len(name) <= 9
 
 
 def _read_scene(path: Path, scene: int) -> PoseRows:
+    """Read the ground truth of one scene; scores are NaN."""
     images = read_typed(path, dict[str, Any], "truth of one scene", syntax="json", limit=LARGEST_TRUTH_BYTES)
     rows = list(_entries(path, images))
     require(rows, f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
@@ -129,7 +131,7 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
 
 
 def _entries(path: Path, images: dict[str, Any]) -> Iterator[tuple[int, str, TruthEntry]]:
-    """Image, where it stands, and what stands there, of every entry."""
+    """Yield image, location and content of every entry."""
     for image, entries in images.items():
         require(_is_number(image), f"{path}: the keys are numbers of images, '{image[:40]}' was given.")
         for i, entry in enumerate(convert_typed(entries, list[TruthEntry], f"{path}, image {image}"), start=1):

@@ -1,11 +1,11 @@
-"""Observed poses as comma-separated values.
+"""Read and write observed poses as comma-separated values.
 
     operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz,deviation_mm,deviation_deg,seen
 
-The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free,
-that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
-about each axis of the part (then those that are assumed), and whether the operation was observed (default). One more
-column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
+Names end with the unit: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free. The
+last three columns are optional, as are single cells of them. They are the standard deviations along and about each
+axis of the part (default: assumed ones), and whether the operation was observed (default: true). One more column,
+`play_mm`, is the clearance per side of parts that fit, equal in all rows (default: the scenario's clearance).
 """
 
 import csv
@@ -25,8 +25,8 @@ from apo_bench.scenario import Scenario, place_layout
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
-_LENGTHS = {"mm": 1e-3, "m": 1.0}
-_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}
+_LENGTHS = {"mm": 1e-3, "m": 1.0}  # factors to m
+_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}  # factors to rad
 _COLUMNS: Columns = {
     **{name: (name, 1.0) for name in ("operation", "part")},
     **{f"{name}_{unit}": (name, size) for name in _POSITION for unit, size in _LENGTHS.items()},
@@ -36,22 +36,23 @@ _COLUMNS: Columns = {
     "seen": ("seen", 1.0),
     **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
 }
-"""What a column stands for, and its unit in m or rad."""
-_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)
+"""Name of a column -> its meaning, and the factor from its unit to m or rad."""
+_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)  # meanings that must have a column
+# Values of the column `seen`.
 _FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
 
 
 def read_table(path: str | Path, scenario: Scenario, assumed: tuple[float, float]) -> tuple[Observation, bool]:
-    """Read an observation from a CSV file; parts start where those of the scenario do.
+    """Read an observation from a CSV file; parts start as in the scenario.
 
     Args:
-        assumed: The deviations, mm and degrees, of operations that state none.
+        assumed: Standard deviations, in mm and degrees, of operations that state none.
 
     Returns:
         The observation, and whether a standard deviation had to be assumed.
 
     Raises:
-        InputError: Anything in the file that is not as described, naming line and column.
+        InputError: The file deviates from the format; the message names line and column.
     """
     assembly = scenario.assembly
     rows = dict[int, CsvRow]()
@@ -80,7 +81,7 @@ def read_table(path: str | Path, scenario: Scenario, assumed: tuple[float, float
 
 
 def table(assembly: Assembly, goals: Array) -> str:
-    """Goals (n, 4, 4) as such a table, in mm, numbers to the last digit."""
+    """Return target poses (n, 4, 4), [m], as a CSV table in mm, with all digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["operation", "part", *(f"{name}_mm" for name in _POSITION), *_QUATERNION])
@@ -91,7 +92,7 @@ def table(assembly: Assembly, goals: Array) -> str:
 
 
 def _operation(row: CsvRow, assembly: Assembly) -> int:
-    """Which operation a row is of, counted from 0."""
+    """Return the operation of a row, counted from 0; check that its part is the one that the operation moves."""
     text = row.text("operation")
     row.require(
         text.isdecimal() and len(text) <= 9 and 1 <= int(text) <= len(assembly),
@@ -108,6 +109,7 @@ def _operation(row: CsvRow, assembly: Assembly) -> int:
 
 
 def _pose(row: CsvRow) -> Array:
+    """Return the pose of a row, (4, 4), [m]."""
     position = [row.number(name, FARTHEST_M) for name in _POSITION]
     units = {row.cells[name].unit for name in _POSITION}
     require(len(units) == 1, f"{row.file}: the columns of a position are of different units; give all in mm, or in m.")
@@ -117,7 +119,11 @@ def _pose(row: CsvRow) -> Array:
 
 
 def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
-    """A standard deviation; the assumed one if the cell is empty."""
+    """Return a standard deviation of a row, [m] or [rad]; the assumed one if the cell is empty.
+
+    Args:
+        limits: Least and greatest allowed value, [m] or [rad].
+    """
     if not row.text(meaning):
         return assumed
     x = row.number(meaning, math.inf)
@@ -127,7 +133,7 @@ def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, f
 
 
 def _play(rows: Sequence[CsvRow], assumed: float) -> float:
-    """The play of parts that fit, [m], which is one number for all rows."""
+    """Return the clearance per side of parts that fit, [m]: the same number in all rows, or the assumed one."""
     stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
         row.require(x >= 0.0 and x == stated[0][1], "play", "one length from 0 for all rows is needed")
@@ -135,6 +141,7 @@ def _play(rows: Sequence[CsvRow], assumed: float) -> float:
 
 
 def _flag(row: CsvRow) -> bool:
+    """Return whether the operation of a row was observed; an empty cell means true."""
     text = row.text("seen").lower()
     row.require(text in _FLAGS, "seen", "true or false is needed")
     return _FLAGS[text]

@@ -1,4 +1,4 @@
-"""Write the kit of a scenario for a real robot: parts to print, a plate with places for tags, and a form of results."""
+"""Write the kit of a scenario for a real robot: parts to print, a base plate with tags, and a form for results."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -20,31 +20,32 @@ FORM_COLUMNS = {
         *("fit_gap_mm", "support_gap_mm", "overlap_percent", "slid_mm", "note"),
     )
 }
-"""Columns of the form, as `read_csv` takes them. Those up to `method` are filled in."""
-FORM_NAME = "form.csv"
-TAG_FAMILY = "tag36h11"
-TAG_EDGE_MM = 30.0  # of the black border, as tag detectors count it
-_TAG_PAPER_MM = 38.0  # with the white margin of one module around the border
-_TAG_AT_MM = 80.0  # from the middle of the plate to that of a tag, along x and y
-_RECESS_MM = 0.4  # how deep the paper lies in the plate: two layers of most printers
-_PLATE_MM = 200.0
+"""Columns of the results form, as `read_csv` takes them; the kit fills in those up to `method`."""
+FORM_NAME = "form.csv"  # the results form
+TAG_FAMILY = "tag36h11"  # of AprilTag
+TAG_EDGE_MM = 30.0  # edge of the black border of a tag, as tag detectors count it
+_TAG_PAPER_MM = 38.0  # edge of the paper of a tag, with a white margin of one module
+_TAG_AT_MM = 80.0  # distance of a tag's centre from the plate's, along x and along y
+_RECESS_MM = 0.4  # depth of the recess for the paper of a tag: two layers of most printers
+_PLATE_MM = 200.0  # edge of the square plate
 _PLATE_THICK_MM = 10.0
-_MM = 1e3
-_DECIMALS = 6  # of coordinates in mm
+_MM = 1e3  # mm in a metre
+_DECIMALS = 6  # of coordinates in mm, so that equal corners of neighbouring pieces are equal numbers
 
 
 def write_kit(
     scenario: Scenario, clearance_mm: float, folder: Path, methods: Sequence[str], trials: int, step: bool
 ) -> Mapping[Path, int]:
-    """Write STL files (and STEP files), `tags.csv` and `form.csv` into a folder.
+    """Write STL files, STEP files if asked for, `tags.csv` and `form.csv` into a folder.
 
     Args:
-        clearance_mm: Per side, by which each fit face recedes.
-        methods: To compare; the form has a line for each of them in each trial.
-        step: Write each part as STEP, too.
+        clearance_mm: Clearance per side, by which each face that fits recedes.
+        methods: Methods to compare; the form has one line per method and trial.
+        trials: Trials of each method.
+        step: Whether to write each part as STEP too.
 
     Returns:
-        File of a part or of the plate -> how many to print.
+        File of a part or of the plate -> number of copies to print.
 
     Raises:
         InputError: The clearance suits no part, STEP files need a package, or a file cannot be written.
@@ -72,7 +73,7 @@ def write_kit(
 
 
 def make_part_mesh(solid: Solid, clearance_mm: float) -> Any:
-    """Return a part as it is printed, a closed mesh of trimesh [mm]; round faces have flat sides.
+    """Return a part as printed, a closed trimesh mesh, [mm]; round faces have flat sides.
 
     Raises:
         InputError: The pieces of the part do not make one closed solid.
@@ -80,7 +81,7 @@ def make_part_mesh(solid: Solid, clearance_mm: float) -> Any:
     import trimesh
     from manifold3d import Manifold, OpType
 
-    # neighbours become one body only where their corners are the same to the last bit
+    # neighbouring pieces only join if their common corners are equal to the last bit
     corners = [np.round(_MM * piece.corners, _DECIMALS) for piece in shrink_pieces(solid, clearance_mm / _MM)]
     mesh = Manifold.batch_boolean([Manifold.hull_points(each) for each in corners], OpType.Add).to_mesh64()
     printable = trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts)
@@ -93,9 +94,9 @@ def make_part_mesh(solid: Solid, clearance_mm: float) -> Any:
 
 
 def make_plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
-    """Return the middle of the table with four recesses for tags, a mesh [mm], z = 0 on top.
+    """Return the base plate, a trimesh mesh, [mm]: the middle of the table with four recesses for tags, top at z = 0.
 
-    Its middle is where the last operation puts its part in the frame of the assembly, which is the frame of the plate.
+    The origin of the plate's frame is its middle: the target of the last operation, in x and y of the assembly's frame.
     """
     from trimesh.boolean import difference, intersection
     from trimesh.creation import box
@@ -110,13 +111,13 @@ def make_plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
 
 
 def _tags() -> list[tuple[str, int, float, float, float, float]]:
-    """Family, number, edge and place on the plate of each tag [mm]."""
+    """Return family, id, edge and position on the plate of each tag, [mm]."""
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     return [(TAG_FAMILY, k, TAG_EDGE_MM, x * _TAG_AT_MM, y * _TAG_AT_MM, -_RECESS_MM) for k, (x, y) in enumerate(signs)]
 
 
 def _write_step(mesh: Any, path: Path) -> None:
-    """Write a mesh as a solid whose faces in one plane are one face."""
+    """Write a mesh as a STEP solid, with coplanar triangles merged into one face."""
     from build123d import Face, Shell, Solid, Wire, export_step
 
     faces = [Face(Wire.make_polygon([tuple(corner) for corner in triangle])) for triangle in mesh.triangles]

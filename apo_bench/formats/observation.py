@@ -1,4 +1,4 @@
-"""Read observed poses from a file, JSON or comma-separated values."""
+"""Read observed poses from a JSON or CSV file."""
 
 from math import radians
 from pathlib import Path
@@ -16,12 +16,12 @@ from apo_bench.scenario import Scenario, place_layout
 
 
 class ObservationFile(NamedTuple):
-    """An observation with its scenario."""
+    """An observation and its scenario."""
 
     observation: Observation
     scenario: Scenario
     assumed: bool
-    """Whether a standard deviation had to be assumed."""
+    """Whether some standard deviation was missing and the default was assumed."""
 
 
 @check_arguments
@@ -56,10 +56,10 @@ def read_observation_file(
     deviation_mm: float | None = None,
     deviation_deg: float | None = None,
 ) -> ObservationFile:
-    """Read an observation from a file, with its scenario, and whether a standard deviation had to be assumed.
+    """Read an observation from a file, and return it with its scenario.
 
     Args:
-        deviation_mm, deviation_deg: As in `read_observation`; None stands for the default.
+        deviation_mm, deviation_deg: As in `read_observation`; None means the default.
     """
     from apo_bench.scenario.file import load_scenario
 
@@ -75,10 +75,10 @@ def read_observation_file(
 
 
 def read_stated(path: str | Path, scenario: Scenario) -> Observation:
-    """Read an observation from a file that states every standard deviation itself.
+    """Read an observation from a file that must state all standard deviations.
 
     Raises:
-        InputError: Anything that is not as described, or a standard deviation is missing.
+        InputError: The file deviates from its format, or a standard deviation is missing.
     """
     observation, _, assumed = read_observation_file(path, scenario)
     require(
@@ -89,7 +89,11 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
 
 
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
-    """Return the nominal poses of a scenario, as if they had been observed with these standard deviations."""
+    """Return the nominal poses of a scenario as an observation with these standard deviations per axis.
+
+    Args:
+        deviation_mm, deviation_deg: Along and about each axis.
+    """
     check_deviations(deviation_mm, deviation_deg)
     layout = place_layout(scenario, 0.0, 0.0, 0.0)
     n = len(scenario.assembly)

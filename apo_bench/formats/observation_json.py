@@ -1,6 +1,6 @@
-"""The JSON form of an observation.
+"""Read and write the JSON form of an observation.
 
-A file names its scenario, which carries the topology; the file itself carries numbers only.
+A file names its scenario, which defines parts, operations and contacts; the file itself holds only numbers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,9 +29,9 @@ from apo_bench.io import FileTable, Finite, NotNegative, Positive, Text, Triple,
 from apo_bench.scenario import Scenario, place_layout
 
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
-_LEAST_FREEDOM = 0.4
-_TAIL_UNITS = TO_MM_DEG[[0, 0, 3, 3]]
-_Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+_LEAST_FREEDOM = 0.4  # least degrees of freedom of Student's t
+_TAIL_UNITS = TO_MM_DEG[[0, 0, 3, 3]]  # factors to mm, mm, deg, deg: across the ray, along it, tilt, turn
+_Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]  # a row of a covariance
 _Matrix = tuple[_Row, _Row, _Row, _Row, _Row, _Row]
 _Freedom = Annotated[float, Meta(ge=_LEAST_FREEDOM, le=1e300)]
 _RATES: Mapping[str, str] = {
@@ -46,11 +46,11 @@ _RATES: Mapping[str, str] = {
     "displaced_view_rate": "view",
     "repeat_rate": "repeat",
 }
-"""Key of a form -> field of `OutlierModel`."""
+"""Key of the form -> field of `OutlierModel`."""
 
 
 class ObservedOperation(PlannedOperation, frozen=True, kw_only=True):
-    """What was observed of an operation; instead of a covariance, one deviation for directions and one for turns."""
+    """An observed operation; standard deviations along and about each axis may stand in for a covariance."""
 
     covariance_mm_deg: _Matrix | UnsetType = UNSET
     seen: bool = True
@@ -59,7 +59,7 @@ class ObservedOperation(PlannedOperation, frozen=True, kw_only=True):
 
 
 class SharedForm(FileTable, frozen=True, kw_only=True):
-    """An error that operations share; without a frame its twist is in the frame of each part."""
+    """An error that several operations share; without a frame its twist is in the frame of each part."""
 
     name: Text
     operations: list[Number]
@@ -70,7 +70,7 @@ class SharedForm(FileTable, frozen=True, kw_only=True):
 
 
 class TailsForm(FileTable, frozen=True, kw_only=True):
-    """How errors are distributed: four numbers each, across and along the ray, tilt and turn about it."""
+    """The distribution of errors; lists of four are across the ray, along it, tilt, and turn about it."""
 
     axes: list[tuple[Triple, Triple, Triple]]
     scales_mm_deg: tuple[Positive, Positive, Positive, Positive]
@@ -86,11 +86,11 @@ OutliersForm = msgspec.defstruct(
     bases=(FileTable,),
     kw_only=True,
 )
-"""How often observations are worse than they state; what is left out is as usual."""
+"""Rates and sizes of gross errors; missing keys mean the defaults of `OutlierModel`."""
 
 
 class ObservationForm(FileTable, frozen=True, kw_only=True):
-    """An observation; what is left out of `start`, `gap_mm` and `play_mm` is as in its scenario."""
+    """The whole form; missing `start`, `gap_mm` and `play_mm` are those of the scenario."""
 
     schema: Literal["apo-bench/observation/2"]
     scenario: Text
@@ -107,7 +107,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
     """Return the JSON form of an observation.
 
     Args:
-        scenario: Its name, or its file.
+        scenario: Name or file of the scenario.
     """
     observed = [
         ObservedOperation(
@@ -134,11 +134,13 @@ def observation_form(observation: Observation, scenario: str) -> Form:
 
 
 def _outliers_form(outliers: OutlierModel) -> Any:
+    """Return the form of an outlier model."""
     camera = UNSET if outliers.camera_m is None else tuple(1e3 * x for x in outliers.camera_m)
     return OutliersForm(**{key: getattr(outliers, name) for key, name in _RATES.items()}, camera_mm=camera)
 
 
 def _shared_form(error: SharedError) -> SharedForm:
+    """Return the form of a shared error, with operations counted from 1."""
     return SharedForm(
         name=error.name,
         operations=[k + 1 for k in error.operations],
@@ -150,12 +152,13 @@ def _shared_form(error: SharedError) -> SharedForm:
 
 
 def _tails_form(tails: Tails) -> TailsForm:
+    """Return the form of an error distribution."""
     return TailsForm(
         axes=[frame.tolist() for frame in tails.frames],
         scales_mm_deg=(tails.scales * _TAIL_UNITS).tolist(),
         degrees_of_freedom=tails.freedom.tolist(),
         deviations_mm_deg=(np.sqrt(tails.variances) * _TAIL_UNITS).tolist(),
-        limits_mm_deg=(tails.limits * _TAIL_UNITS[[0, 2]]).tolist(),
+        limits_mm_deg=(tails.limits * _TAIL_UNITS[[0, 2]]).tolist(),  # the limits of lengths and of angles
         joined=tails.joined,
     )
 
@@ -165,18 +168,18 @@ def read_json_observation(
 ) -> tuple[Observation, bool]:
     """Read an observation from its JSON form.
 
-    `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`), `outliers`
-    (default: not known) and `seen` (default: true) may be left out. Instead of `covariance_mm_deg`, `deviation_mm` and
-    `deviation_deg` state one standard deviation for the three directions and one for the three turns.
+    Optional: `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`),
+    `outliers` (default: unknown) and `seen` (default: true). Instead of `covariance_mm_deg`, `deviation_mm` and
+    `deviation_deg` state one standard deviation along and one about the three axes.
 
     Args:
-        assumed: The deviations, mm and degrees, of operations that state none.
+        assumed: Standard deviations, in mm and degrees, of operations that state none.
 
     Returns:
         The observation, and whether a standard deviation had to be assumed.
 
     Raises:
-        InputError: Anything in the file that is not as described, naming file and key.
+        InputError: The file deviates from the form; the message names file and key.
     """
     file = str(path)
     form = read_typed(path, ObservationForm, "observation", syntax="json")
@@ -200,11 +203,12 @@ def read_json_observation(
         shared=tuple(_shared(file, error, len(assembly)) for error in form.shared),
         tails=None if isinstance(form.tails, UnsetType) else _tails(file, form.tails, len(assembly)),
     )
+    # No covariance and no deviations.
     return observation, any(entry.covariance_mm_deg is UNSET is entry.deviation_mm for entry in form.operations)
 
 
 def _check_operations(file: str, entries: Sequence[PlannedOperation], assembly: Assembly) -> None:
-    """Check that every operation stands once, in order, with the part that it moves."""
+    """Check that every operation is listed once, in order, with the part that it moves."""
     stated = [(entry.operation, entry.part) for entry in entries]
     needed = [(k, operation.main) for k, operation in enumerate(assembly.operations, start=1)]
     require(len(stated) == len(needed), f"{file}, operations: {len(needed)} entries are needed, not {len(stated)}.")
@@ -216,6 +220,7 @@ def _check_operations(file: str, entries: Sequence[PlannedOperation], assembly: 
 
 
 def _read_start(file: str, forms: Mapping[str, PoseForm], assembly: Assembly) -> Poses:
+    """Return the start of every part of the scenario, world, [m]."""
     for part in forms:
         require_known("part", part, tuple(assembly.solids), place=f"{file}, start")
     for part in assembly.solids:
@@ -224,15 +229,21 @@ def _read_start(file: str, forms: Mapping[str, PoseForm], assembly: Assembly) ->
 
 
 def _outliers(file: str, form: Any) -> OutlierModel:
+    """Return the outlier model that a form states."""
     stated = {key: value for key, value in msgspec.structs.asdict(form).items() if value is not UNSET}
     camera = {"camera_m": [1e-3 * x for x in stated.pop("camera_mm")]} if "camera_mm" in stated else {}
     return convert_typed({_RATES[key]: x for key, x in stated.items()} | camera, OutlierModel, f"{file}, outliers")
 
 
 def _shared(file: str, form: SharedForm, n: int) -> SharedError:
+    """Return a shared error with operations counted from 0.
+
+    Args:
+        n: Number of operations.
+    """
     place = f"{file}, shared, {form.name}"
     m = len(form.operations)
-    once = len(set(form.operations)) == m > 0 and max(form.operations) <= n
+    once = len(set(form.operations)) == m > 0 and max(form.operations) <= n  # no duplicates, at least one
     require(once, f"{place}, operations: operations from 1 to {n}, each once, are needed.")
     require(form.local is UNSET or form.frame is not UNSET, f"{place}, local: state the frame, or leave this out.")
     return SharedError(
@@ -246,7 +257,7 @@ def _shared(file: str, form: SharedForm, n: int) -> SharedError:
 
 
 def _correlation(rows: list[list[float]], m: int, place: str) -> Array:
-    """Return a correlation matrix, (m, m)."""
+    """Return a correlation matrix, (m, m), after checking its size, symmetry and diagonal."""
     square = [len(row) for row in rows] == [m] * m
     correlation = np.array(rows if square else np.zeros((m, m)), dtype=np.float64)
     holds = np.abs(correlation - correlation.T).max() <= 1e-9 and np.abs(np.diag(correlation) - 1.0).max() <= 1e-9
@@ -255,6 +266,7 @@ def _correlation(rows: list[list[float]], m: int, place: str) -> Array:
 
 
 def _tails(file: str, form: TailsForm, n: int) -> Tails:
+    """Return the error distribution of n operations that a form states."""
     axes = np.array(form.axes, dtype=np.float64).reshape(-1, 3, 3)
     rotations = np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) <= 1e-6
     require(len(axes) == n and rotations, f"{file}, tails, axes: a rotation matrix for each operation is needed.")
@@ -269,7 +281,11 @@ def _tails(file: str, form: TailsForm, n: int) -> Tails:
 
 
 def _covariance(rows: _Matrix, place: str, *, definite: bool = True) -> Array:
-    """Return a covariance (6, 6), [m, rad], from one in mm and degrees."""
+    """Return a covariance (6, 6), [m, rad], from one in mm and degrees.
+
+    Args:
+        definite: Whether it must be positive definite; otherwise semidefinite.
+    """
     C = np.array(rows)
     largest = float(np.abs(C).max())
     lowest = float(np.linalg.eigvalsh((C + C.T) / 2)[0])
@@ -280,7 +296,11 @@ def _covariance(rows: _Matrix, place: str, *, definite: bool = True) -> Array:
 
 
 def _stated(file: str, entry: ObservedOperation, assumed: tuple[float, float]) -> Array:
-    """Return the covariance of an operation, (6, 6) [m, rad], as it is stated in either way, or as it is assumed."""
+    """Return the covariance of an operation, (6, 6), [m, rad]: as stated, from standard deviations, or as assumed.
+
+    Args:
+        assumed: Standard deviations in mm and degrees.
+    """
     place = f"{file}, operation {entry.operation}"
     if not isinstance(entry.covariance_mm_deg, UnsetType):
         C = _covariance(entry.covariance_mm_deg, f"{place}, covariance_mm_deg")
@@ -288,5 +308,6 @@ def _stated(file: str, entry: ObservedOperation, assumed: tuple[float, float]) -
         return C
     mm, deg = entry.deviation_mm, entry.deviation_deg
     require((mm is UNSET) == (deg is UNSET), f"{place}: state both 'deviation_mm' and 'deviation_deg', or neither.")
+    # Either both are stated or none.
     mm, deg = assumed if isinstance(mm, UnsetType) or isinstance(deg, UnsetType) else (mm, deg)
     return np.diag(np.array([mm] * 3 + [deg] * 3) / TO_MM_DEG) ** 2

@@ -1,4 +1,4 @@
-"""The JSON form of a plan."""
+"""Write the JSON form of a plan."""
 
 from typing import Any
 
@@ -11,10 +11,10 @@ PLAN_SCHEMA = "apo-bench/plan/2"
 
 
 def plan_form(plan: Plan, scenario: str) -> Form:
-    """Return the JSON form of a plan; a step has a pose where that is not the target pose of its operation.
+    """Return the JSON form of a plan; a step has its own pose only if that differs from the target of its operation.
 
     Args:
-        scenario: Its name, or its file.
+        scenario: Name or file of the scenario.
     """
     operations = [
         {"operation": k + 1, "part": operation.main, **pose_form(plan.target_poses[k])}

@@ -1,4 +1,4 @@
-"""ROBOT.toml: frames and quaternions in which a plan goes out to a robot."""
+"""Read ROBOT.toml: the frames and the order of quaternions in which a plan is exported to a robot."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,17 +14,17 @@ from apo_bench.scenario.values import AnyPose
 @final
 @dataclass(frozen=True, eq=False)
 class RobotFrames:
-    """Where a robot stands, what its poses are of, and how its quaternions are written."""
+    """The frames and the order of quaternions that a robot uses."""
 
     T_world_base: Array = field(default_factory=lambda: np.eye(4))
-    """(4, 4), [m]."""
+    """(4, 4), pose of the robot's base in the world, [m]."""
     T_flange_tip: Array | None = None
-    """(4, 4), [m]; None: poses are those of the tip."""
+    """(4, 4), flange from tip, [m]; None: exported poses are those of the tip."""
     quaternion: Literal["xyzw", "wxyz"] = "xyzw"
 
 
 class RobotTable(FileTable, frozen=True, kw_only=True):
-    """What stands in the file."""
+    """The tables of a robot file."""
 
     schema: Literal["apo-bench/robot/1"]
     base: AnyPose | None = None
@@ -33,10 +33,10 @@ class RobotTable(FileTable, frozen=True, kw_only=True):
 
 
 def read_robot_frames(path: str | Path) -> RobotFrames:
-    """What a robot file states.
+    """Read the frames of a robot file.
 
     Raises:
-        InputError: Anything that is not as described, naming file and key.
+        InputError: The file deviates from the form; the message names file and key.
     """
     top = read_typed(path, RobotTable, "robot file")
     return RobotFrames(

@@ -1,4 +1,4 @@
-"""Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
+"""Geometry of rigid parts: poses, faces, solids, overlap, penetration, symmetry and grasp places."""
 
 from apo_bench.geometry.arrays import Array, Ints, copy_frozen, copy_real, freeze, make_copyable, remember
 from apo_bench.geometry.clearance import recede_pieces, shrink_pieces

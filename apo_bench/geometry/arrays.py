@@ -1,4 +1,4 @@
-"""Read-only arrays, records that stay so in every copy, and a cache of what follows from them."""
+"""Immutable records: read-only arrays in frozen dataclasses and their copies, and a cache of results by object."""
 
 import copyreg
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 
 _MOST_ANSWERS = 16
-"""Answers that are kept of one object; further ones are worked out each time."""
+"""Most results that the cache keeps per object; further ones are computed each time."""
 
 
 def copy_real(value: ArrayLike) -> Array:
@@ -64,11 +64,11 @@ def copy_frozen(value: ArrayLike, *shape: int | None) -> Array:
 
 
 def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
-    """Have fields of a frozen dataclass hold read-only copies of what they were given; those that are None stay so.
+    """Replace fields of a frozen dataclass by read-only copies; fields that are None stay so.
 
     Args:
-        shapes: Field -> the shape of its array, as in `copy_frozen`, or of each array in it, if it is a mapping;
-            None: it is a mapping of other things.
+        shapes: Field -> the shape of its array, as in `copy_frozen`, or of each array in it, if it is a mapping; None:
+            it is a mapping of other things.
 
     Raises:
         ArgumentError: An array is not as `copy_frozen` needs it, with the name of the field.
@@ -88,7 +88,7 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
 
 
 def make_copyable(record: type[Record]) -> type[Record]:
-    """Have a frozen dataclass copied and pickled through its constructor: what it holds is read-only in the copy too.
+    """Decorate a frozen dataclass so that it is copied and pickled through its constructor: copies are read-only too.
 
     A read-only mapping cannot be pickled by itself, and an array that was pickled can be written to.
     """
@@ -97,15 +97,17 @@ def make_copyable(record: type[Record]) -> type[Record]:
 
 
 def _reduced(record: Any) -> tuple[Any, ...]:
+    """Reduce a record to its class and plain fields, as `copyreg.pickle` needs it."""
     values = {field.name: getattr(record, field.name) for field in fields(record)}
     plain = {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in values.items()}
     return partial(record.__class__, **plain), ()
 
 
 def remember(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
-    """Keep what a function of an object, and of plain values, returned, for as long as the object lives.
+    """Decorate a function to cache its results by its first argument, an object, for as long as that object lives.
 
-    For objects that are compared by identity and never change. What is returned is shared, so it must not be changed.
+    The object must be compared by identity and never change; other arguments must be hashable. Results are shared, so
+    they must not be changed.
     """
     known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Answer]] = WeakKeyDictionary()
 

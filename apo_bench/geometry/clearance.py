@@ -1,4 +1,4 @@
-"""The physical part: fit faces recede by the clearance, nothing else moves."""
+"""Shapes with clearance: the pieces of a nominal solid after every fit face has receded by the clearance."""
 
 import numpy as np
 
@@ -10,24 +10,25 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
 _ON_M = 1e-7
+"""Distance from the plane, cylinder or cone of a face up to which a side lies on it, [m]."""
 _PARALLEL = 1e-7
-"""A side lies on a face if it is this near to its plane, [m], or touches its cylinder or cone so nearly."""
+"""Difference of a cosine from that of aligned directions, up to which a side is parallel to a face."""
 _SLIVER = 1e-6
-"""A side that covers less than this part of itself of a flat face only borders on it."""
+"""A side that shares less than this fraction of its area with a flat face only borders on the face."""
 _CRUMBS = 0.01
-"""Pieces that the clearance swallows are left out up to this part of the volume."""
+"""Pieces that vanish by the clearance are left out up to this fraction of the volume of the part."""
 _THINNEST_M = 5e-5
-"""Half of what a box is thick at least, [m]; what is thinner, MuJoCo takes for nothing. What is left of another piece
-must contain a ball of this radius."""
+"""Half the least thickness of a piece, [m], since MuJoCo ignores thinner boxes; other pieces must contain a ball of
+this radius."""
 
 
 def shrink_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """The pieces of the part as it is made, same names and order; those that recede to nothing, if they are hardly any
-    of it, are left out.
+    """The pieces of a physical part with clearance: same names and order, fit faces moved inwards.
 
-    Every side of a piece that carries a fit face, or a piece of one, moves into it by the clearance; so a round hole
-    gets wider. The nominal part has none: walls and stick of one size touch. With clearance c a stick of 20 mm is
-    20 - 2c thick, a pocket of 50 mm is 50 + 2c wide.
+    Every side of a piece that carries a fit face, or a part of one, moves inwards by the clearance; so a round hole
+    gets wider. The nominal part has no clearance: walls and stick of one size touch. With clearance c a stick of 20 mm
+    is 20 - 2c thick, a pocket of 50 mm is 50 + 2c wide. Pieces of which nothing remains are left out, if they are
+    hardly any of the part.
 
     Args:
         clearance_m: How far each fit face recedes, >= 0, [m].
@@ -46,9 +47,9 @@ def shrink_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
 
 @remember
 def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """`shrink_pieces` of a part that fits; among pieces other than boxes, a box is taken as one of them.
+    """`shrink_pieces` without the check of the clearance; a negative clearance moves the fit faces outwards.
 
-    By less than nothing they come forward.
+    If any piece is not a box, boxes are treated as general convex pieces too.
     """
     from scipy.spatial import ConvexHull
 
@@ -69,8 +70,9 @@ def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
 
 
 def _recede_box(solid: Solid, box: Box, clearance_m: float) -> Box:
-    # Each side that carries a fit face moves inwards: a half size loses half of what both sides lose, the centre goes
-    # away from the side that loses more.
+    """The box after each side that carries a fit face has moved inwards by the clearance."""
+    # `planes` lists the sides +x, +y, +z, then -x, -y, -z. A half size loses half of what both sides lose; the centre
+    # moves away from the side that loses more.
     high, low = clearance_m * np.array([_carries_fit(solid, box, side) for side in box.planes]).reshape(2, 3)
     half = box.half - (low + high) / 2
     require(
@@ -82,7 +84,11 @@ def _recede_box(solid: Solid, box: Box, clearance_m: float) -> Box:
 
 
 def _carries_fit(solid: Solid, box: Box, side: Array) -> bool:
-    """Whether a side of the box, (n, d), carries a fit face, or a piece of one; it must then carry no other."""
+    """Whether a side of the box, (n, d), carries a fit face or a part of one.
+
+    Raises:
+        InputError: It carries a face that is not fit as well.
+    """
     on = [face for face in solid.faces.values() if _on_flat(face, box, side)]
     fit = [face.name for face in on if face.fit]
     other = [face.name for face in on if not face.fit]
@@ -95,7 +101,7 @@ def _carries_fit(solid: Solid, box: Box, side: Array) -> bool:
 
 
 def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
-    """A piece whose sides on fit faces moved inwards: a hole gets wider, a shaft thinner, both by the clearance.
+    """A convex piece after its sides on fit faces have moved inwards by the clearance.
 
     Raises:
         InputError: Nothing is left of the piece.
@@ -107,6 +113,7 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
         return hull
     planes = np.array(hull.planes)
     planes[on, 3] -= clearance_m
+    # Intersecting half spaces needs an interior point: the mean of the corners, else the centre of the largest ball.
     inside = hull.corners.mean(axis=0)
     if (planes[:, 3] - planes[:, :3] @ inside).min() < _THINNEST_M:
         inside, radius = _middle(planes)
@@ -114,16 +121,22 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
             raise _swallowed(solid, hull, clearance_m)
     from scipy.spatial import HalfspaceIntersection
 
+    # scipy states half spaces as n . x + b <= 0, hence b = -d.
     corners = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], inside).intersections
     return Hull(hull.name, _each_once(corners))
 
 
 def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
-    """A cylinder whose wall, or whose ends, recede."""
+    """A cylinder after its wall, its ends, or both have receded by the clearance, as far as these are fit.
+
+    Raises:
+        InputError: Nothing is left of the cylinder.
+    """
     assert hull.cylinder is not None
     center, axis, radius, half = hull.cylinder
     if any(face.fit and _same_wall(face, hull) for face in solid.rounds.values()):
         radius -= clearance_m
+    # The two ends as planes (n, d), and their positions along the axis from the centre after receding.
     sides = {sign: np.append(sign * axis, sign * axis @ center + half) for sign in (-1.0, 1.0)}
     ends = [sign * (half - clearance_m * _on_fit(solid, hull, side)) for sign, side in sides.items()]
     if radius < _THINNEST_M or ends[1] - ends[0] < 2.0 * _THINNEST_M:
@@ -134,6 +147,7 @@ def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
 
 
 def _swallowed(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
+    """The error of a piece that the clearance leaves too thin."""
     return InputError(
         f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * _THINNEST_M:g} mm of piece '{hull.name}' of "
         f"part '{solid.name}'; give less."
@@ -141,6 +155,7 @@ def _swallowed(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
 
 
 def _same_wall(face: RoundFace, hull: Hull) -> bool:
+    """Whether a round face is the outer wall of a cylinder piece: same axis, same radius, not a hole."""
     assert hull.cylinder is not None
     center, axis, radius, _ = hull.cylinder
     off = center - face.point
@@ -154,13 +169,16 @@ def _same_wall(face: RoundFace, hull: Hull) -> bool:
 
 
 def _on_fit(solid: Solid, hull: Hull, side: Array) -> bool:
-    """Whether a side, (n, d), lies on a fit face."""
+    """Whether a side, (n, d), lies on a fit face, flat or round."""
     flat = any(face.fit and _on_flat(face, hull, side) for face in solid.faces.values())
     return flat or any(face.fit and _on_round(face, hull, side) for face in solid.rounds.values())
 
 
 def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
-    """Whether a side touches the wall of a hole from outside, somewhere along its span."""
+    """Whether a side, (n, d), is tangent to the wall of a hole from outside, somewhere along its span.
+
+    The pieces around a hole approximate its wall by such sides; walls of shafts and rims never match.
+    """
     if not face.hole or face.kind == "rim":
         return False
     # A side is tangent to the cone r(s) = r0 + slope s about the axis if its normal makes sine slope * w with the axis
@@ -175,7 +193,7 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
 
 
 def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
-    """Whether a side lies in the plane of a face and covers some of it."""
+    """Whether a side, (n, d), lies in the plane of a face and covers some of it."""
     from shapely import MultiPoint
 
     n = side[:3]
@@ -187,12 +205,12 @@ def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
 
 
 def _corners_on(piece: Piece, side: Array) -> Array:
-    """The corners of a side, (k, 3)."""
+    """The corners of a piece that lie on one of its sides, (n, d): (k, 3), [m]."""
     return np.asarray(piece.corners[np.abs(piece.corners @ side[:3] - side[3]) < _ON_M])
 
 
 def _middle(planes: Array) -> tuple[Array, float]:
-    """The middle of the largest ball inside of all planes, (3,), and its radius, [m]."""
+    """Centre, (3,), and radius of the largest ball inside all planes (n, d), (s, 4), [m]; radius 0 if there is none."""
     from scipy.optimize import linprog
 
     # maximise r so that n . x + r <= d for every plane: the largest ball, by its middle x and radius r.
@@ -202,6 +220,6 @@ def _middle(planes: Array) -> tuple[Array, float]:
 
 
 def _each_once(corners: Array) -> Array:
-    """Corners (k, 3) without those that are the same but for rounding."""
+    """Corners, (k, 3), without duplicates up to rounding, in their order."""
     _, first = np.unique(np.round(corners, 9), axis=0, return_index=True)
     return np.asarray(corners[np.sort(first)])

@@ -1,4 +1,4 @@
-"""Convex pieces: their shadows, what is around several of them, and along which directions two of them may be apart."""
+"""Building blocks of separating-axis tests of convex pieces: projections, candidate axes, rays and bounding volumes."""
 
 from functools import lru_cache
 
@@ -10,17 +10,17 @@ from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece
 
 _ALONG = 1e-12
-"""Cosine between a ray and the normal of a plane that it goes along."""
+"""Cosine between a ray and the normal of a plane, up to which the ray counts as parallel to the plane."""
 _PARALLEL = 1e-6
-"""Edges whose cross product is shorter give no direction of their own."""
+"""Length of the cross product of two unit edges, up to which they count as parallel and give no axis."""
 
 
 def project_on_axes(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
-    """The middles and half lengths, (k,) each, of the shadow of a piece on axes of the world, its frame at the origin.
+    """Project a piece, with its frame at the origin, on k axes: middle and half length of each interval, (k,), [m].
 
     Args:
-        R: (3, 3), the orientation of the piece.
-        axes: (k, 3), unit vectors.
+        R: (3, 3), the orientation of the piece, world.
+        axes: (k, 3), unit vectors, world.
     """
     own = axes @ R
     if isinstance(piece, Hull):
@@ -32,28 +32,27 @@ def project_on_axes(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
 
 
 def find_separating_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
-    """The directions, (k, 3), along which two pieces may be apart: across sides, and across an edge of each."""
+    """All axes that can separate two convex pieces, (k, 3), world: normals of sides, cross products of two edges."""
     return np.concatenate([across_sides(a, R_a, b, R_b), across_edges(a, R_a, b, R_b)])
 
 
 def across_sides(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
-    """Those that are normals of a side, (k, 3)."""
+    """The separating axes that are normals of a side of one of two pieces, (k, 3), world."""
     return np.concatenate([a.normals @ R_a.T, b.normals @ R_b.T])
 
 
 def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
-    """Those across an edge of each, (k, 3)."""
+    """The separating axes that are cross products of an edge of each of two pieces, (k, 3), world, unit length."""
     return _cross(a.edges @ R_a.T, b.edges @ R_b.T)
 
 
 def box_axes(R_a: Array, R_b: Array) -> Array:
-    """The directions along which two boxes may be apart, (k, 3), by their orientations, (3, 3)."""
+    """All axes that can separate two boxes, (k, 3), world, from their orientations R_a and R_b, (3, 3)."""
     return np.concatenate([R_a.T, R_b.T, _cross(R_a.T, R_b.T)])
 
 
 def _cross(edges_a: Array, edges_b: Array) -> Array:
-    """The cross product of each of some directions, (a, 3), with each of others, (b, 3), unit length; parallel ones
-    give none."""
+    """Unit cross products of every pair of directions, (a, 3) and (b, 3); pairs that are parallel are left out."""
     u = edges_a[:, None]
     v = edges_b[None]
     pairs = np.empty((len(u), v.shape[1], 3))
@@ -66,14 +65,14 @@ def _cross(edges_a: Array, edges_b: Array) -> Array:
 
 
 def measure_passage(planes: Array, start: Array, way: Array) -> tuple[Array, Array]:
-    """How far rays go until they enter a convex piece, and until they leave it, (*,) each; inf and -inf if they miss.
+    """Distances after which rays enter and leave a convex piece, (*,) each, [m]; inf and -inf for rays that miss it.
 
     Args:
         planes: (s, 4), n . x <= d inside, [m].
         start, way: (*, 3), where each ray begins and its unit vector; one of them may be the same for all, (3,).
     """
-    # n . (s + t w) = d at t = (d - n . s) / (n . w): entered by planes against the way, left by planes along it; on
-    # which side of a plane a ray along it is, it says where it begins.
+    # n . (s + t w) = d at t = (d - n . s) / (n . w): a ray enters through planes with n . w < 0 and leaves through
+    # those with n . w > 0. A ray parallel to a plane stays on the side of it on which it begins.
     rate = way @ planes[:, :3].T
     room = planes[:, 3] - start @ planes[:, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -86,29 +85,34 @@ def measure_passage(planes: Array, start: Array, way: Array) -> tuple[Array, Arr
 
 @lru_cache(maxsize=1024)
 def collect_corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
-    """The corners of all pieces, (k, 3), in the frame of their solid, [m], and where those of each begin."""
+    """The corners of all pieces, piece by piece, (k, 3), frame of the solid, [m], and the first index of each piece."""
     corners = [piece.corners for piece in pieces]
     return copy_frozen(np.concatenate(corners), None, 3), np.cumsum([0, *map(len, corners[:-1])])
 
 
 @lru_cache(maxsize=1024)
 def boxes_around(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
-    """Centres and half sizes, (k, 3) each, of boxes or of those around pieces, in the frame of their solid, [m]."""
+    """Centres and half sizes, (k, 3) each, of the axis-aligned box around each piece, frame of the solid, [m]."""
     return copy_frozen([piece.center for piece in pieces], None, 3), copy_frozen(
         [piece.half for piece in pieces], None, 3
     )
 
 
 def boxes_reach(a: tuple[Piece, ...], R_a: Array, b: tuple[Piece, ...], R_b: Array, axes: Array) -> Array:
-    """Half lengths of the shadows on axes, (k, 3), of each box of a solid and each of another together, (a, b, k)."""
-    # The shadow of a box of half sizes h on a unit vector u of its frame is |u| . h long to each side.
+    """Sum of the half lengths of the projections of each box of a and each box of b on each of k axes, (a, b, k), [m].
+
+    Args:
+        R_a, R_b: Orientations of the solids, (3, 3), world.
+        axes: (k, 3), unit vectors, world.
+    """
+    # The projection of a box of half sizes h on a unit vector u of its frame has half length |u| . h.
     halves = [boxes_around(of)[1] @ np.abs(axes @ R).T for of, R in ((a, R_a), (b, R_b))]
     return np.asarray(halves[0][:, None] + halves[1][None])
 
 
 @lru_cache(maxsize=4096)
 def enclose_in_ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
-    """Middle, (3,), of the box around all pieces, in the frame of their solid, and half its diagonal, [m]."""
+    """Centre, (3,), and radius, [m], of a ball around all pieces, frame of the solid; it encloses their common box."""
     centers, halves = boxes_around(pieces)
     low = (centers - halves).min(axis=0)
     high = (centers + halves).max(axis=0)
@@ -116,7 +120,7 @@ def enclose_in_ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
 
 
 def measure_ball_distance(a: tuple[Piece, ...], T_a: Array, b: tuple[Piece, ...], T_b: Array) -> float:
-    """How far the balls around all pieces of two posed solids are apart, [m]; negative where they overlap."""
+    """The distance of the balls around two posed solids, [m]; negative where they overlap."""
     middle_a, radius_a = enclose_in_ball(a)
     middle_b, radius_b = enclose_in_ball(b)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]

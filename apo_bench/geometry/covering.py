@@ -1,4 +1,4 @@
-"""How much of one face covers another, and where: the corners at which a contact is measured (Fig. 1)."""
+"""Overlap of two flat faces: the area where one, projected onto the plane of the other, covers it (Fig. 1)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,32 +14,34 @@ from apo_bench.geometry.polygon import find_corners
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
-"""Cosine between the normals below which a face is observed edge-on and covers nothing."""
+"""Cosine between two normals below which one face is edge-on to the other and covers nothing."""
 SLIVER_M2 = 1e-12
-"""Pieces smaller than this, (0.001 mm)^2, are rounding, not overlap."""
+"""Pieces of overlap smaller than this, (0.001 mm)^2, are rounding, [m^2]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """What is left of a face when another one is laid on it along the normal."""
+    """The common area of two faces, on the plane of the lower one, along whose normal the other one is projected."""
 
     corners: Array
-    """Every corner of every piece, of holes too, (k, 3), world, [m], on the plane of the lower face; (0, 3) if none."""
+    """The corners of all pieces of the overlap and of their holes, (k, 3), world, [m]; (0, 3) if nothing overlaps."""
     area: float
-    """[m^2]."""
+    """The area of the overlap, [m^2]."""
     shape: Any = None
-    """The overlap as a shapely geometry in the frame of the lower face, so that overlaps on one face compare."""
+    """The overlap as a shapely geometry in the frame of the lower face, so that overlaps on one face can be
+    compared."""
 
     def __bool__(self) -> bool:
         return self.area > 0.0
 
 
 NO_OVERLAP = Overlap(np.zeros((0, 3)), 0.0)
+"""The overlap of faces that do not cover each other."""
 
 
 class FacePair(NamedTuple):
-    """A face that is laid on another one."""
+    """Two posed faces, of which the first is projected onto the plane of the second."""
 
     face: Face
     """In the frame of its solid."""
@@ -52,18 +54,18 @@ class FacePair(NamedTuple):
 
 
 def compute_overlaps(laid: Sequence[FacePair]) -> list[Overlap]:
-    """Project faces along the normals of others onto their planes and clip them there (Section 2.2, Fc of Fig. 1).
+    """Project faces along the normals of others onto their planes and intersect them there (Section 2.2, Fc of Fig. 1).
 
-    Concave outlines, holes and several pieces are allowed. How far the planes are apart does not matter. One call for
-    many pairs of faces takes a tenth of the time of as many calls.
+    Outlines may be concave, with holes; an overlap may consist of several pieces. The distance of the planes does not
+    matter. One call for many pairs takes a tenth of the time of as many calls.
 
     Returns:
-        For each pair the overlap; nothing, if the faces only touch along an edge or the upper one is observed edge-on.
+        The overlap of each pair; `NO_OVERLAP` if the faces only touch along an edge or one is edge-on to the other.
     """
     import shapely
 
     common = _intersect(laid)
-    # Every ring of every piece, in turn: the last point of a ring is the first one once more.
+    # All rings of all pieces. shapely repeats the first point of a ring as its last, which is dropped here.
     rings, piece = shapely.get_rings(common.pieces, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     once = np.append(ring[1:] == ring[:-1], False)[: len(ring)]
@@ -86,14 +88,17 @@ def compute_overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap
 
 
 def compute_overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
-    """The area of `overlap` alone, [m^2]."""
+    """The area of `compute_overlap` alone, [m^2]."""
     return float(_intersect([FacePair(face, T_face, on, T_on)]).areas[0])
 
 
 def compute_shares(reached: Sequence[Overlap], true: Sequence[Overlap]) -> Array:
-    """How much of each true overlap is covered by the one that was reached on the same lower face, (k,), 0 to 1.
+    """The fraction of each true overlap that the reached overlap on the same lower face covers, (k,), 0 to 1.
 
-    1 where the true one is empty.
+    It is 1 where the true overlap is empty.
+
+    Args:
+        reached, true: k overlaps each, in the same order; both of a pair lie on one lower face.
     """
     import shapely
 
@@ -104,7 +109,7 @@ def compute_shares(reached: Sequence[Overlap], true: Sequence[Overlap]) -> Array
 
 
 def measure_lateral_gap(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
-    """How far `face`, projected onto the plane of `on`, lies off it, [m]; 0 if one covers some of the other."""
+    """The distance in the plane of `on` between that face and the projection of `face`, [m]; 0 if they overlap."""
     return float(_project([face], (_into_plane(on) @ pose.inverse(T_on) @ T_face)[None])[0].distance(flatten_face(on)))
 
 
@@ -115,22 +120,23 @@ def measure_face_area(face: Face) -> float:
 
 
 class _Common(NamedTuple):
-    """What pairs of faces cover of each other, in the planes of the lower ones."""
+    """Intersections of k pairs of faces, in the planes of the lower ones."""
 
     shapes: NDArray[np.object_]
-    """(k,) shapely geometries; None of faces observed edge-on."""
+    """(k,) shapely geometries; None where one face is edge-on to the other."""
     areas: Array
-    """(k,), without slivers, [m^2]."""
+    """(k,) areas without slivers, [m^2]."""
     pieces: NDArray[np.object_]
-    """(p,) shapely polygons, all but slivers, in the order of the pairs."""
+    """(p,) shapely polygons of all pairs, in the order of the pairs, without slivers."""
     owners: NDArray[np.intp]
-    """(p,), the pair that each piece belongs to."""
+    """(p,) index of the pair that each piece belongs to."""
 
 
 def _intersect(laid: Sequence[FacePair]) -> _Common:
+    """Intersect each pair of faces in the plane of the lower one."""
     import shapely
 
-    # Everything in the plane of `on`, z along its normal: there dropping heights projects along the normal.
+    # T takes each upper face to the plane frame of the lower one, z along its normal: dropping z projects the face.
     T_ons = np.array([each.T_on for each in laid]).reshape(-1, 4, 4)
     T_faces = np.array([each.T_face for each in laid]).reshape(-1, 4, 4)
     T = np.array([_into_plane(each.on) for each in laid]).reshape(-1, 4, 4) @ (pose.inverse(T_ons) @ T_faces)
@@ -147,7 +153,7 @@ def _intersect(laid: Sequence[FacePair]) -> _Common:
 
 
 def _project(faces: Sequence[Face], T: Array) -> NDArray[np.object_]:
-    """Faces, as shapely polygons, in the plane z = 0 after poses T, (k, 4, 4): heights are dropped."""
+    """The faces as shapely polygons: posed by T, (k, 4, 4), and projected onto the plane z = 0."""
     import shapely
 
     rings = [_rings(face) for face in faces]
@@ -163,25 +169,26 @@ def _project(faces: Sequence[Face], T: Array) -> NDArray[np.object_]:
 
 @lru_cache(maxsize=4096)
 def _rings(face: Face) -> tuple[Array, tuple[int, ...]]:
-    """The corners of the outline and of each hole, one after the other, (k, 3), and how many each has."""
+    """The corners of the outline and of all holes, ring after ring, (k, 3), and the number of corners of each ring."""
     rings = (face.outline, *face.holes)
     return np.concatenate(rings), tuple(map(len, rings))
 
 
 @lru_cache(maxsize=4096)
 def flatten_face(face: Face) -> Any:
-    """The face in its own plane, a shapely polygon."""
+    """The face as a shapely polygon in its own plane frame (`make_plane_frame`)."""
     return _project([face], _into_plane(face)[None])[0]
 
 
 @lru_cache(maxsize=4096)
 def _into_plane(face: Face) -> Array:
+    """The transform, (4, 4), from the frame of the solid to the plane frame of the face."""
     return pose.inverse(make_plane_frame(face))
 
 
 @lru_cache(maxsize=4096)
 def make_plane_frame(face: Face) -> Array:
-    """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
+    """The plane frame of a face, (4, 4), in the frame of its solid: z along the normal, x along the longest edge."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]
     z = face.normal

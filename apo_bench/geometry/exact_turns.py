@@ -1,8 +1,8 @@
-"""The turns that carry a solid of any pieces and faces onto itself: found by where its faces can go.
+"""Symmetries of a solid with any pieces and faces: candidate rotations from corresponding marks on its faces.
 
-The middles of faces, and their corners, are points that a symmetry carries onto points of like faces. Two of
-them that do not lie on one line with the centre of volume say all of a turn, so every pair of points that they could
-be carried to gives one candidate; those that carry all faces onto like faces, and pieces into pieces, are kept.
+Marks are points such as centres and corners of faces, which a symmetry maps onto marks of the same kind. Two marks that
+are not collinear with the centre of volume determine a rotation. So every pair of marks to which they could be mapped
+gives one candidate. Candidates that map all faces onto like faces, and pieces into pieces, are kept.
 """
 
 from typing import NamedTuple
@@ -17,24 +17,25 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
 
 _SAME_M = 1e-6
-"""Points that are nearer are the same."""
+"""Points closer than this are equal, [m]."""
 _COARSE = 1.0 / np.cos(np.pi / 16) - 1.0
-"""Round walls are made of sixteen sides or more; corners so far off a wall, as a part of its radius, lie on it."""
+"""Tolerance for corners of the polygons that stand for round walls, as a fraction of the radius: at least sixteen
+sides."""
 _APART = 1e-2
-"""Sine of the angle between two points, seen from the centre, that say all of a turn."""
+"""Least sine of the angle between two marks, seen from the centre of volume, that determine a rotation."""
 
 
 class _Marks(NamedTuple):
-    """Points that a symmetry carries onto points with the same tag, seen from the centre of volume."""
+    """Points on the faces of a solid, relative to its centre of volume, with a kind; a symmetry keeps the kind."""
 
     points: Array
     """(k, 3), [m]."""
     tags: NDArray[np.intp]
-    """(k,)."""
+    """(k,), number of the kind of each."""
 
 
 def exact_turns(solid: Solid) -> Array:
-    """The displacements that leave a solid as it is, (m, 4, 4), the identity first; not of a part of revolution."""
+    """The displacements that map a solid onto itself, (m, 4, 4), the identity first; not for parts of revolution."""
     marks = _marks(solid)
     turns = [np.eye(3)]
     for R in _candidates(marks):
@@ -45,8 +46,8 @@ def exact_turns(solid: Solid) -> Array:
 
 
 def carries_faces(solid: Solid, g: Array) -> bool:
-    """Whether a displacement, (4, 4), carries faces onto like faces, and pieces into pieces."""
-    about = centred_turn(solid, g[:3, :3])
+    """Whether a displacement, (4, 4), maps faces onto like faces, and pieces into pieces."""
+    about = centred_turn(solid, g[:3, :3])  # a symmetry keeps the centre of volume, so g must equal this
     return bool(
         np.abs(g - about).max() < _SAME_M
         and _carries(_marks(solid), g[:3, :3])
@@ -55,9 +56,12 @@ def carries_faces(solid: Solid, g: Array) -> bool:
 
 
 def fills_the_same(solid: Solid, g: Array, within_m: float) -> bool:
-    """Whether a displacement (4, 4) carries points of all pieces into the union of pieces, or as near as this.
+    """Whether a displacement, (4, 4), maps sample points of all pieces into the union of pieces, up to a distance.
 
-    Volumes are the same then, so nothing of the union is left bare.
+    The volumes are equal, so no part of the union stays empty.
+
+    Args:
+        within_m: How far outside the union a point may lie, [m].
     """
     points = pose.apply(g, np.concatenate([_points(piece) for piece in solid.pieces]))
     deepest = np.full(len(points), -np.inf)
@@ -70,14 +74,14 @@ def fills_the_same(solid: Solid, g: Array, within_m: float) -> bool:
 
 
 def _points(piece: Piece) -> Array:
-    """Corners of a piece, its middle, and what lies between them, (k, 3)."""
+    """Sample points of a piece, (k, 3), [m]: its corners, their mean, and points in between."""
     corners = piece.corners
     middle = corners.mean(axis=0)
     return np.concatenate([corners, middle + 0.9 * (corners - middle), middle + 0.5 * (corners - middle), middle[None]])
 
 
 def measure_depth_inside(piece: Piece, points: Array) -> Array:
-    """How deep points, (k, 3), are inside a piece, (k,), [m]; negative outside."""
+    """The depth of points, (k, 3), inside a convex piece, (k,), [m]; negative outside."""
     if isinstance(piece, Hull):
         planes = piece.planes
         return np.asarray((planes[:, 3] - points @ planes[:, :3].T).min(axis=1))
@@ -85,19 +89,21 @@ def measure_depth_inside(piece: Piece, points: Array) -> Array:
 
 
 def _doubt(solid: Solid) -> float:
-    """How far pieces may be from round walls, [m]."""
+    """How far the flat sides of pieces may be from the round walls that they stand for, [m]."""
     return _SAME_M + _COARSE * max((max(face.radii) for face in solid.rounds.values()), default=0.0)
 
 
 def centred_turn(solid: Solid, R: Array) -> Array:
-    """The turn about the centre of volume, (4, 4): x -> R x + (c - R c)."""
+    """The rotation R about the centre of volume c as a displacement, (4, 4): x -> R x + (c - R c)."""
     return pose.rigid(R, solid.centroid - R @ solid.centroid)
 
 
 def _marks(solid: Solid) -> _Marks:
-    """The middles of flat faces and a point above each, both ends of round ones, and corners that are on no round wall.
+    """The marks of a solid: centres and corners of flat faces, a point above each centre, and ends of round faces.
 
-    Names do not count, nor do rims, which other faces end in; marks of fit, sizes and kinds do.
+    Corners on round walls are left out, since polygons stand for them. A round face that is only an arc has a mark at
+    its middle too. Kinds count the type of face, fit and sizes, not names. Rims are left out, since other faces end in
+    them.
     """
     points = list[Array]()
     tags = list[tuple[object, ...]]()
@@ -108,6 +114,7 @@ def _marks(solid: Solid) -> _Marks:
         middle = _middle(flat)
         for kind, own in (("middle", [middle]), ("above", [middle + 0.01 * flat.normal]), ("corner", list(corners))):
             points += own
+            # A point above the face, on its outside, tells a face from one that points the other way.
             tags += [("flat", kind, flat.fit, len(corners))] * len(own)
     for wall in rounds:
         for end, radius, other in zip(wall.ends, wall.radii, wall.radii[::-1], strict=True):
@@ -122,12 +129,15 @@ def _marks(solid: Solid) -> _Marks:
 
 
 def _key(length: float) -> int:
-    """Micrometres; lengths in halves of one, which are common, are not rounded up here and down there."""
+    """A length as an integer, [um].
+
+    The shift by 0.25 makes multiples of half a micrometre, which are common, all round the same way.
+    """
     return round(length * 1e6 + 0.25)
 
 
 def _middle(face: Face) -> Array:
-    """The centre of area of a flat face, (3,), [m]."""
+    """The centroid of a flat face without its holes, (3,), [m]."""
     whole = 0.0
     moment = np.zeros(3)
     origin = face.outline[0]
@@ -142,7 +152,7 @@ def _middle(face: Face) -> Array:
 
 
 def _on_walls(rounds: list[RoundFace], corners: Array) -> NDArray[np.bool_]:
-    """Which corners, (k, 3), are those of a polygon that stands for a circle, (k,)."""
+    """Which corners, (k, 3), belong to a polygon that stands for a round wall, (k,)."""
     on_wall = np.zeros(len(corners), dtype=np.bool_)
     for wall in rounds:
         along = (corners - wall.point) @ wall.axis
@@ -154,9 +164,13 @@ def _on_walls(rounds: list[RoundFace], corners: Array) -> NDArray[np.bool_]:
 
 
 def _candidates(marks: _Marks) -> list[Array]:
-    """Turns, (3, 3), that carry two of the rarest marks onto like marks."""
+    """Rotations, (3, 3), that map two of the rarest marks onto marks of the same kinds and distances.
+
+    Empty if no two marks determine a rotation.
+    """
     far = np.linalg.norm(marks.points, axis=1)
     rare = np.bincount(marks.tags)[marks.tags]
+    # Rarest kinds first, since they give the fewest candidates; marks at the centre of volume say nothing.
     order = [int(i) for i in np.lexsort((np.arange(len(far)), rare)) if far[i] > 1e3 * _SAME_M]
     if not order:
         return []
@@ -177,15 +191,17 @@ def _candidates(marks: _Marks) -> list[Array]:
 
 
 def _like(marks: _Marks, far: Array, i: int) -> NDArray[np.bool_]:
+    """Which marks have the kind of mark i and its distance from the centre of volume (`far`), (k,)."""
     return np.asarray((marks.tags == marks.tags[i]) & (np.abs(far - far[i]) < _SAME_M))
 
 
 def _sine(p: Array, q: Array) -> float:
+    """The sine of the angle between two vectors, (3,)."""
     return float(np.linalg.norm(np.cross(p, q)) / (np.linalg.norm(p) * np.linalg.norm(q)))
 
 
 def _frame(p: Array, q: Array) -> Array:
-    """The rotation whose x axis is along p, with q in the plane of x and y."""
+    """The rotation with its x axis along p, z along p x q."""
     x = p / np.linalg.norm(p)
     z = np.cross(p, q)
     z = z / np.linalg.norm(z)
@@ -193,7 +209,7 @@ def _frame(p: Array, q: Array) -> Array:
 
 
 def _carries(marks: _Marks, R: Array) -> bool:
-    """Whether a turn carries every mark onto one with the same tag."""
+    """Whether a rotation maps every mark onto a mark of the same kind, and every mark is reached."""
     apart = np.linalg.norm((marks.points @ R.T)[:, None] - marks.points[None], axis=-1)
     near = (apart < 10 * _SAME_M) & (marks.tags[:, None] == marks.tags[None])
     return bool(near.any(axis=1).all() and near.any(axis=0).all())

@@ -1,4 +1,6 @@
-"""The turns after which a part nearly fills the same space: where an estimator of poses takes one side for another."""
+"""Approximate symmetries: quarter and half turns after which a part nearly looks the same, so that it may be
+misjudged.
+"""
 
 from typing import NamedTuple
 
@@ -13,36 +15,38 @@ from apo_bench.geometry.solid import Piece, Solid
 from apo_bench.geometry.symmetry import find_revolution, find_symmetries, make_turn
 
 LEAST_SHARE = 0.7
-"""A turned part that covers less of itself is not mistaken."""
+"""Least share of its own volume that a turned part covers to be confused with the part as it is."""
 _POINTS = 500
-"""About so many points stand for the volume of a part."""
+"""Approximate number of sample points that stand for the volume of a part."""
 _GOLDEN = 1.2207440846057596
-"""The real root of g^4 = g + 1."""
+"""The real root of g^4 = g + 1, which generates the sequence R3."""
 _ALIGNED = 1e-2
-"""Products of inertia below this part of the trace: the axes of the frame are principal axes."""
+"""Products of inertia below this fraction of the trace: the axes of the frame count as principal axes."""
 _SAME = 1e-6
+"""Tolerance of equal displacements, [m] and entries of rotations, and of points on the surface of a piece, [m]."""
 _TURNS_RAD = (np.pi / 2, np.pi, -np.pi / 2)
+"""The tested angles about each axis, [rad]."""
 
 
 class Flips(NamedTuple):
-    """Body displacements F, m of them: seen at `T F`, a part looks nearly as it does at `T`."""
+    """The m displacements F of a part after which it nearly looks the same: at `T F` nearly as at `T`."""
 
     turns: Array
-    """(m, 4, 4), turns by 90 and 180 degrees about axes through the centre of volume, [m]; never the identity."""
+    """(m, 4, 4), rotations by 90 or 180 degrees about axes through the centre of volume, [m]; never the identity."""
     shares: Array
-    """(m,), the part of its volume that the turned part covers."""
+    """(m,), the share of its own volume that the turned part covers, 0 to 1."""
     exact: NDArray[np.bool_]
-    """(m,), whether the turn is one of `find_symmetries`: nothing is observed then, but contacts name other faces."""
+    """(m,), whether the rotation is an exact symmetry (`find_symmetries`): it cannot be observed, but contacts name
+    other faces."""
 
 
 @remember
 def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Flips:
-    """The turns by 90 and 180 degrees with which a solid covers at least this share of its own volume.
+    """The rotations by 90 and 180 degrees after which a solid covers at least a given share of its own volume.
 
-    They are about its box axes, or its principal axes where these are others, through the centre of volume. The share
-    is measured at about 500 points, so within about 0.04. Symmetries that are exact are kept and marked. Of a part of
-    revolution turns about its axis are left out, since no contact depends on them, and one that turns it end over end
-    stands for all.
+    The axes go through the centre of volume, along the axes of the frame, or along the principal axes where these
+    differ. The share is measured at about 500 points, so within about 0.04. Exact symmetries are kept and marked. Of a
+    part of revolution only one half turn that swaps its ends is tried: no contact depends on turns about its axis.
 
     Args:
         least_share: From 0 to 1.
@@ -57,7 +61,7 @@ def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) 
     exact = np.abs(turns[:, None] - find_symmetries(solid)).max(axis=(2, 3)).min(axis=1) < _SAME
     shares = np.ones(len(turns))
     turned = np.concatenate([np.zeros((0, 3)), *(pose.apply(F, points) for F in turns[~exact])])
-    # Share = volume of the points that lie in the part after the turn, over the volume of all points.
+    # Share = volume of the points that lie in the part after the turn, over that of all points; exact turns have 1.
     covered = np.any([_inside(piece, turned) for piece in solid.pieces], axis=0)
     shares[~exact] = covered.reshape(-1, len(points)) @ weights / weights.sum()
     kept = shares >= least_share
@@ -68,9 +72,10 @@ def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) 
 
 
 def _points(solid: Solid) -> tuple[Array, Array]:
-    """Points (k, 3) inside a solid, and the volume that each stands for, (k,): evenly in the box of every piece.
+    """Sample points inside a solid, (k, 3), [m], and the volume that each stands for, (k,).
 
-    The sequence R3 of M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+    They are even in the box of every piece: the sequence R3 of M. Roberts, "The unreasonable effectiveness of
+    quasirandom sequences", 2018.
     """
     pieces = solid.pieces
     own = np.repeat(np.arange(len(pieces)), max(2, _POINTS // len(pieces)))
@@ -82,13 +87,15 @@ def _points(solid: Solid) -> tuple[Array, Array]:
     points = np.array([piece.center for piece in pieces])[own] + (2.0 * unit - 1.0) * half
     weights = half.prod(axis=1)
     inside = np.array([_inside(piece, points) for piece in pieces])
-    drawn = inside[own, np.arange(len(own))]
+    drawn = inside[own, np.arange(len(own))]  # the point lies in its own piece, not just in the box around that
     # A point of a piece that lies in c pieces at once is drawn in each of them, so it counts 1 / c.
     return points[drawn], weights[drawn] / inside.sum(axis=0)[drawn]
 
 
 def _axes(solid: Solid) -> Array:
-    """Three axes, one in each row, (3, 3): those of the frame if they are principal, else the principal ones."""
+    """The axes of the tested turns as rows, (3, 3): those of the frame if they are principal, else the principal
+    axes.
+    """
     J = solid.inertia
     if J is None or np.abs(J - np.diag(np.diag(J))).max() < _ALIGNED * np.trace(J):
         return np.eye(3)
@@ -96,7 +103,7 @@ def _axes(solid: Solid) -> Array:
 
 
 def _inside(piece: Piece, points: Array) -> NDArray[np.bool_]:
-    """Which points, (k, 3), are in a piece, (k,); only those in the box around it are compared with its planes."""
+    """Which points, (k, 3), lie in a piece, (k,); only those in its box are compared with its planes, to save time."""
     near = np.flatnonzero((np.abs(points - piece.center) <= piece.half + _SAME).all(axis=1))
     inside = np.zeros(len(points), dtype=np.bool_)
     inside[near] = measure_depth_inside(piece, points[near]) >= -_SAME

@@ -1,4 +1,4 @@
-"""Convex pieces that are no boxes: their corners, the sides between them, and cylinders among them."""
+"""Convex pieces other than boxes, given by their corners; cylinders are prisms that remember their axis and radius."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,14 +10,15 @@ from apo_bench.geometry.arrays import Array, copy_frozen, freeze, make_copyable
 from apo_bench.geometry.polygon import find_direction_across
 
 SAGITTA_M = 5e-6
-"""A round wall is stood for by flat ones that are nowhere farther from it."""
+"""Largest distance between a round wall and the flat sides that stand for it, [m]."""
 FEWEST_SIDES = 16
+"""Least number of flat sides of a round wall."""
 _FLAT = 1e-7
-"""Normals of triangles, and directions of edges, are the same within this."""
+"""Two unit vectors are equal if their cosine is above 1 minus this."""
 
 
 def count_sides(radius_m: float) -> int:
-    """Into how many sides, an even number, a round wall is cut: r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
+    """The even number N of flat sides of a round wall, so that r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
     return max(FEWEST_SIDES, 2 * int(np.ceil(np.pi / np.arccos(radius_m / (radius_m + SAGITTA_M)) / 2.0)))
 
 
@@ -29,37 +30,39 @@ class Cylinder(NamedTuple):
     axis: Array
     """Unit vector, (3,)."""
     radius: float
+    """[m]."""
     half_length: float
+    """Half the length along the axis, [m]."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Hull:
-    """The smallest convex piece that contains its corners, in the frame of its solid."""
+    """The convex hull of some corners, in the frame of its solid."""
 
     name: str
     corners: Array
-    """(k, 3), each a corner of the piece, [m]."""
+    """(k, 3), each a vertex of the hull, [m]."""
     cylinder: Cylinder | None = None
-    """The cylinder that it stands for; its corners lie on the edges of that one."""
+    """The cylinder that the hull approximates, its corners on the two circles; None for any other hull."""
 
     def __post_init__(self) -> None:
         freeze(self, corners=(None, 3))
 
     @cached_property
     def center(self) -> Array:
-        """The middle of the box around it, (3,), [m]."""
+        """The centre of the axis-aligned box around the hull, (3,), [m]."""
         return copy_frozen((self.corners.min(axis=0) + self.corners.max(axis=0)) / 2, 3)
 
     @cached_property
     def half(self) -> Array:
-        """Half the size of the box around it, (3,), [m]."""
+        """Half the size of the axis-aligned box around the hull, (3,), [m]."""
         return copy_frozen((self.corners.max(axis=0) - self.corners.min(axis=0)) / 2, 3)
 
     @cached_property
     def planes(self) -> Array:
-        """Its sides, (s, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
+        """The sides, (s, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
         from scipy.spatial import ConvexHull
 
         planes = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
@@ -67,12 +70,12 @@ class Hull:
 
     @cached_property
     def normals(self) -> Array:
-        """Directions across its sides, (s, 3), each once up to its sign."""
+        """Normals of the sides, (s, 3), each direction once, whichever its sign."""
         return copy_frozen(self.planes[find_distinct_directions(self.planes[:, :3]), :3], None, 3)
 
     @cached_property
     def edges(self) -> Array:
-        """Directions of its edges, (e, 3), each once up to its sign."""
+        """Directions of the edges, (e, 3), each once, whichever its sign."""
         n = self.planes[:, :3]
         d = self.planes[:, 3]
         # Two sides meet in an edge if they share two corners; the edge lies along the cross product of their normals.
@@ -85,7 +88,7 @@ class Hull:
 
 
 def make_cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
-    """A cylinder as a piece: a prism whose corners lie on its edges."""
+    """A cylinder as a convex piece: a prism whose corners lie on its two circles."""
     n = count_sides(cylinder.radius)
     z = cylinder.axis
     x = find_direction_across(z)
@@ -97,7 +100,11 @@ def make_cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
 
 
 def find_distinct_directions(directions: Array, signed: bool = False) -> Array:
-    """Row numbers of unit vectors, (k, 3), none of which is another one of them, or its opposite."""
+    """Indices of the distinct ones among unit vectors, (k, 3): the first of each group that is equal.
+
+    Args:
+        signed: True: opposite vectors are distinct; False: they are equal.
+    """
     cosine = directions @ directions.T
     alike = (cosine if signed else np.abs(cosine)) > 1.0 - _FLAT
     kept: list[int] = []

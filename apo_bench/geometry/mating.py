@@ -1,6 +1,7 @@
-"""How two posed faces of which one is round lie to each other: shaft in hole, shaft on plane, cone in cone or on a rim.
+"""Relative pose of two mating faces of which one is round: shaft in hole, shaft on plane, cone in cone, cone on rim.
 
-All that asks whether such a contact is closed asks this: the judge, the checks of a scenario, recognition, predictions.
+The judge, the checks of scenarios, contact detection and failure prediction all use this measurement to decide whether
+such a contact is closed.
 """
 
 import math
@@ -18,48 +19,49 @@ from apo_bench.geometry.solid import Face
 _EDGE_ON = 1e-6
 """Cosine between two axes, or sine between an axis and the normal of a plane, below which nothing is covered."""
 _RIM_M = 1e-3
-"""The circle of a rim counts as a strip of this width."""
+"""Width of the strip that stands for the circle of a rim, [m]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Mate:
-    """What is between two faces, measured at the two ends of their common length, or at the middle of a rim."""
+    """The misalignment of two faces, measured at both ends of their common length, or at the middle of a rim."""
 
     points: Array
-    """Where it is measured, on the axis of the first face that has one, (k, 3), world, [m]."""
+    """Where the misalignment is measured, on the axis of the first face that has one, (k, 3), world, [m]."""
     off: Array
-    """From where these points should be to where they are, (k, 3), world, [m]: across the axis of the second face, or
-    along the normal of the flat one, out of it where the shaft is above it."""
+    """Offset of each point from its ideal position, (k, 3), world, [m]: perpendicular to the axis of the second face,
+    or along the normal of the flat face, outwards where the shaft is above it."""
     axis: Array
-    """Of the second face, if that is round, else of the first; unit vector, (3,), world; of a cone or a rim towards
-    where it, or what it takes, is wider."""
+    """Axis of the second face, or of the first if the second is flat; unit vector, (3,), world. Of a cone or a rim it
+    points to where the cone, or the cone that the rim takes, is wider."""
     angle_rad: float
-    """Between the two axes; between the axis of a shaft and the plane."""
+    """Angle between the two axes, or between the axis of a shaft and the plane."""
     rise_m: float
-    """Of a cone: how far the shaft would still have to go into the hole, along the axis, until it sits; 0 of others."""
+    """For a cone: how far the shaft still has to move into the hole, along the axis, until it is seated; otherwise
+    0."""
     sine: float
-    """Of the angle between the wall of that cone and its axis: walls are `rise_m * sine` apart."""
+    """Sine of the half angle of that cone: the distance of the walls is `rise_m * sine`; otherwise 0."""
     common: Overlap
-    """The common length, as the piece of wall around it, unrolled: `share` compares places along the second face. Of
-    a shaft on a plane, the shadow of the shaft over the line of contact."""
+    """The overlap. For coaxial faces it is the wall along the common length, unrolled to a plane: `compute_shares`
+    compares intervals along the second face. For a shaft and a plane see `_on_plane`."""
     length_m: float
-    """How long the line of contact is, or how far the shaft is in the hole, along the axis; 0 of a rim."""
+    """Length of the line of contact of a shaft on a plane, or of the shaft in the hole, along the axis; 0 for a rim."""
 
     @property
     def gap_m(self) -> float:
-        """How far the walls are from where they should be, anywhere on the common length, [m]."""
+        """Largest distance of the walls from their ideal position anywhere on the common length, [m]."""
         return float(max(np.sqrt((self.off * self.off).sum(axis=1)).max(), abs(self.rise_m) * self.sine))
 
 
 def measure_mate(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Mate:
-    """Measure two faces that can make a contact, of which at least one is round.
+    """Measure two posed faces that can make a contact, of which at least one is round.
 
     Args:
         a: A face, in the frame of its solid.
         T_a: World pose of that solid, (4, 4), [m].
         b: The face that it is compared with.
-        T_b: World pose of that solid.
+        T_b: World pose of that solid, (4, 4), [m].
     """
     if isinstance(a, Face):
         assert isinstance(b, RoundFace)
@@ -70,13 +72,13 @@ def measure_mate(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Arra
 
 
 def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
-    """A shaft in a hole, in either order: both cylinders, or both cones."""
+    """Measure a shaft in a hole, in either order: both cylinders, or both cones."""
     ends = pose.apply(T_a, a.ends)
     origin = pose.apply(T_b, b.point[None])[0]
     u = T_a[:3, :3] @ a.wider
     v = T_b[:3, :3] @ b.wider
     along = T_b[:3, :3] @ b.axis
-    # Where the ends of one face are along the axis of the other, and what both spans have in common.
+    # Coordinates of the ends of face a along the axis of face b, and the interval that both spans have in common.
     at = (ends - origin) @ along
     low = max(at.min(), b.span[0])
     high = min(at.max(), b.span[1])
@@ -93,13 +95,14 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
 
 
 def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
-    """A cone on the rim of a hole, or the rim of a shaft in a countersink, in either order."""
+    """Measure a cone on the rim of a hole, or the rim of a shaft in a countersink, in either order."""
     (cone, T_cone), (rim, T_rim) = ((a, T_a), (b, T_b)) if b.kind == "rim" else ((b, T_b), (a, T_a))
     u = T_a[:3, :3] @ a.wider
     v = T_b[:3, :3] @ b.wider
     middle = pose.apply(T_rim, rim.middle[None])
     on_cone = pose.apply(T_cone, cone.point[None])
     points = middle if a.kind == "rim" else middle - _across(middle - on_cone, T_cone[:3, :3] @ cone.wider)
+    # Offset of a relative to b: that of the rim relative to the cone, or the opposite.
     off = _across(middle - on_cone, T_cone[:3, :3] @ cone.wider) * (1.0 if a.kind == "rim" else -1.0)
     rise, sine = _rise(cone, T_cone, rim, T_rim)
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
@@ -109,15 +112,17 @@ def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
 
 
 def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of_plane: bool) -> Mate:
-    """A shaft on a plane, or a plane on a shaft.
+    """Measure a shaft on a plane.
 
     Args:
-        of_plane: Whether places are compared on the plane, else along the shaft.
+        of_plane: True: `common` is the shadow of the shaft on the plane; False: it is its wall over the line of
+            contact, unrolled.
     """
     ends = pose.apply(T_shaft, shaft.ends)
     n = T_flat[:3, :3] @ flat.normal
     axis = T_shaft[:3, :3] @ shaft.axis
     flat_ends = pose.apply(pose.inverse(T_flat @ make_plane_frame(flat)), ends)[:, :2]
+    # Intervals of the axis, 0 at its first end and 1 at its last, that lie over the face; the whole axis if none does.
     lines = _lines(flat_ends, flat) if _reaches(shaft, T_shaft, n) else []
     at = np.array(lines).reshape(-1) if lines else np.array([0.0, 1.0])
     points = ends[0] + np.outer([at.min(), at.max()], ends[1] - ends[0])
@@ -134,38 +139,48 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
 
 
 def _rise(cone: RoundFace, T_cone: Array, other: RoundFace, T_other: Array) -> tuple[float, float]:
-    """How far the shaft of a cone and another cone, or a rim, is from its seat, and the sine of the cone."""
+    """How far a shaft must still go into its hole until cone and other face are seated, [m], and the sine of the cone.
+
+    Args:
+        cone: The conical wall of the shaft or the hole.
+        other: A cone or a rim on the other part.
+    """
     seat = cone.where_wide(other.radius)
-    # The cone sits where it is as wide as the other face; how far apart the two are along its axis is the rise.
+    # The faces are seated where the cone has the radius of the other face: the distance along its axis is the rise.
     between = pose.apply(T_cone, seat[None])[0] - pose.apply(T_other, other.middle[None])[0]
     sign = -1.0 if cone.hole else 1.0
     return float(sign * between @ (T_cone[:3, :3] @ cone.wider)), abs(cone.slope) / float(np.hypot(1.0, cone.slope))
 
 
 def _across(v: Array, axis: Array) -> Array:
-    """What is left of vectors, (*, 3), across an axis."""
+    """The components of vectors, (*, 3), perpendicular to a unit axis."""
     return np.asarray(v - (v @ axis)[..., None] * axis)
 
 
 def measure_angle(u: Array, v: Array) -> float:
-    """The angle between two vectors, (3,), exact also where the cosine is flat, [rad]."""
+    """The angle between two vectors, (3,), [rad]; accurate for small angles too, unlike the arc cosine."""
     return math.atan2(_length_of_cross(u, v), u @ v)
 
 
 def _between(u: Array, v: Array) -> float:
-    """Between two lines, [rad]."""
+    """The angle between two undirected lines, 0 to pi / 2, [rad]."""
     return math.atan2(_length_of_cross(u, v), abs(u @ v))
 
 
 def _length_of_cross(u: Array, v: Array) -> float:
-    """|u x v|; `numpy.cross` takes ten times as long for one pair."""
+    """|u x v| of two vectors, (3,); `numpy.cross` takes ten times as long for one pair."""
     x, y, z = u.tolist()
     a, b, c = v.tolist()
     return math.hypot(y * c - z * b, z * a - x * c, x * b - y * a)
 
 
 def _reaches(shaft: RoundFace, T: Array, n: Array) -> bool:
-    """Whether a shaft is round where it would lie on a plane that looks along n."""
+    """Whether the wall of a shaft, if it is only an arc, faces a plane with normal n.
+
+    Args:
+        T: World pose of the solid of the shaft, (4, 4).
+        n: Outward normal of the plane, (3,), world.
+    """
     if shaft.toward is None or shaft.extent_rad >= WHOLE_TURN:
         return True
     down = _across(-n, T[:3, :3] @ shaft.axis)
@@ -173,11 +188,15 @@ def _reaches(shaft: RoundFace, T: Array, n: Array) -> bool:
 
 
 def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
-    """Where a line, (2, 2), in the frame of a flat face is over it: from and until, as parts of its length."""
+    """Intervals in which a line lies over a flat face, as fractions of its length, (low, high).
+
+    Args:
+        ends: Both ends of the line in the plane frame of the face, (2, 2), [m].
+    """
     from shapely import LineString
 
     way = ends[1] - ends[0]
-    # A line that stands on the face covers nothing of it.
+    # A line perpendicular to the face has no length in its plane.
     if way @ way < _EDGE_ON**2 * 1e-6:
         return []
     covered = LineString(ends).intersection(flatten_face(flat))
@@ -191,7 +210,13 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
 
 
 def _shadow(lines: list[tuple[float, float]], ends: Array, radius: float, points: Array) -> Overlap:
-    """The shadow of a shaft over its lines of contact, in the frame of the flat face."""
+    """The projection of a shaft onto a flat face along its lines of contact, in the plane frame of the face.
+
+    Args:
+        lines: Intervals of the shaft, as returned by `_lines`.
+        ends: Both ends of its axis in the plane frame, (2, 2), [m].
+        points: The corners of the result, (k, 3), world, [m].
+    """
     from shapely import LineString, union_all
 
     cut = [ends[0] + np.outer(line, ends[1] - ends[0]) for line in lines]
@@ -200,7 +225,7 @@ def _shadow(lines: list[tuple[float, float]], ends: Array, radius: float, points
 
 
 def _unroll(spans: list[tuple[float, float]], width: float, points: Array) -> Overlap:
-    """A wall between heights along its axis, (low, high), unrolled to a plane."""
+    """A wall over intervals (low, high) along its axis, [m], unrolled to rectangles of the given width in a plane."""
     from shapely import box, union_all
 
     walls = [box(low, 0.0, high, width) for low, high in spans]

@@ -1,4 +1,4 @@
-"""The union of convex pieces as one closed mesh."""
+"""Surface mesh of a part: the union of its convex pieces as one closed mesh."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -7,7 +7,7 @@ from apo_bench.geometry.solid import Box, Piece
 
 
 def build_union_mesh(pieces: Iterable[Piece]) -> Any:
-    """A mesh of trimesh; vertices stay apart where the surface touches itself."""
+    """Return a `trimesh.Trimesh` of the union; where the surface touches itself, vertices are not merged."""
     import manifold3d
     import trimesh
 

@@ -1,6 +1,10 @@
-"""Where two flat pads that come from above can hold a part: its thickness along level rays, and the places it offers.
+"""Places on a part that two flat pads of a gripper from above can hold, found by ray casting.
 
-Pads hold what begins and ends at the same places along all rays of some length: opposite flat faces, a shaft's wall.
+Level rays through the convex pieces give the thickness of the part at every height. Pads hold what begins and ends at
+the same places along neighbouring rays: opposite flat faces, or the wall of a shaft along a line.
+
+In this file `up` is the vertical, `across` the level direction along which the pads close, and `along` = up x across.
+On these axes t is the coordinate along `along`, h the one along `up`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,62 +21,79 @@ from apo_bench.geometry.polygon import find_plane_across
 from apo_bench.geometry.solid import Piece, Solid, measure_extent
 
 PAD_M = (0.016, 0.010, 0.026)
-"""How far pads reach from between their tips: to each side, down and up, [m]."""
+"""Extent of a pad from the point between the tips: to each side, down and up, [m]."""
 _FINGER_M = 0.012
+"""Thickness of a finger along the closing direction, [m]."""
 FINGER_ROOM_M = 0.012
-"""How thick a finger is; how far it stands off before it closes."""
+"""Free width that a finger needs next to the held surface, beyond its own thickness, to come down and open, [m]."""
 _PALM_M = 0.060
+"""Height of the palm above the tips, [m]: the part may reach at most so far above them."""
 _OVER_M = 0.0115
-"""A part reaches at most so far up next to the tips, which are at least so high above what it stands on."""
+"""Least height of the tips above the lowest point of the part, [m], so that the pads clear what the part stands on."""
 _RAY_M = 0.003
+"""Spacing of the rays, [m]."""
 _FINE_M = 0.001
+"""Spacing of the rows of rays where `_RAY_M` finds no hold, [m], as on a thin flange; also least length of a pinch."""
 _FLAT_M = 1e-4
+"""Surfaces that lie at most so far behind the outermost one are pressed by the pad too, [m]."""
 _LINE_M = 0.003
-"""Rays are so far apart, and rows of them so where that finds nothing, as on a thin flange; surfaces so deep behind the
-outermost one are pressed, too; and so long at least."""
+"""Least length of a pressed line, [m]. A pressed area that is narrower than this counts as a line."""
 _PINCH_M = 0.006
+"""Tips higher than this over the top of the part pinch its upper edge, [m]: denser rays, shorter pressed lines."""
 _PINCH_RAY_M = 0.0005
-"""Tips that are farther over the top pinch it: rays are denser, and a shorter line will do."""
+"""Spacing of the rows of rays for a pinch, [m]."""
 _ROUNDING_M = 1e-6
+"""Slack when rays are matched to the extent of a piece, [m]."""
 _TINY_M = 1e-8
-"""Heights are rounded."""
+"""Slack when heights of tips are compared with their limits, [m]."""
 _LEVEL = 1e-3
+"""Largest cosine at which two directions count as perpendicular; 1 minus it: as parallel."""
 _HEIGHT = 0.65
-"""Height of the tips over the part's lowest point that is best, as a part of its height."""
+"""Preferred height of the tips above the lowest point of the part, as a fraction of its height."""
 _LESS_M = 0.002
+"""Half a held width may be so much less than half the extent of the part and still count as all of it, [m]."""
 _UNEVEN_M = 0.003
-"""So much farther from the middle a flat hold may be than a line on a shaft."""
+"""Extra cost of a hold along a line, [m]: a flat hold so much farther from the centre of mass is as good."""
 
 
 class PadPlace(NamedTuple):
-    """A place for the pads; in the frame of the part, [m]."""
+    """A place for the two pads, in the frame of the part, [m]."""
 
     point: Array
-    """Between the tips, (3,)."""
+    """The point between the tips, (3,)."""
     across: Array
-    """Along which they close, unit vector, (3,)."""
+    """The direction along which the pads close, unit vector, (3,)."""
     half_width: float
+    """Half the width of what is held, along `across`."""
 
 
 class _Rays(NamedTuple):
-    """What rays along a direction pass through."""
+    """A grid of r parallel level rays, and the intervals along each in which it passes through pieces, [m]."""
 
     t: Array
-    """Where each ray is across their direction and the vertical, (r,)."""
+    """Coordinate of each ray along up x across, (r,)."""
     h: Array
-    """How high each ray is, (r,)."""
+    """Height of each ray, (r,)."""
     low: Array
-    """Where they enter the pieces that they pass through, in rising order, (r, m); infinite behind the last."""
+    """Coordinates along the ray at which it enters pieces, ascending, (r, m); padded with inf."""
     high: Array
+    """Coordinates at which it leaves the same pieces, (r, m); padded with -inf."""
 
 
 def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> tuple[float, float] | None:
-    """From where to where the part reaches between pads that close on a point, [m] from it; None: nothing is there.
+    """Measure the material between two pads that close on a point.
 
-    Pads that close on the gap between two arms of a part press these towards each other.
+    If the point lies in the gap between two arms of a part, the span reaches from the outside of one arm to the outside
+    of the other, since the pads press the arms towards each other.
 
     Args:
+        point: The point between the tips, (3,), frame of the part, [m].
+        across: The direction along which the pads close, unit vector, (3,).
         up: The vertical, unit vector, (3,), frame of the part.
+
+    Returns:
+        Begin and end of the material along `across`, relative to the point, [m]; None if there is nothing between the
+        pads.
     """
     along = np.cross(up, across)
     side, down, over = PAD_M
@@ -92,25 +113,31 @@ def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up
 def measure_held_width(
     pieces: tuple[Piece, ...], point: tuple[float, ...], across: tuple[float, ...], up: tuple[float, ...]
 ) -> float | None:
-    """Half of the width of what pads hold that close on a point, [m]; None if there is nothing between them."""
+    """Half the width of what two pads hold that close on a point, [m]; None if there is nothing between them.
+
+    The arguments are those of `measure_held_span`, as tuples, so that the result can be cached.
+    """
     span = measure_held_span(pieces, np.array(point), np.array(across), np.array(up))
     return None if span is None else (span[1] - span[0]) / 2
 
 
 def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
-    """Whether pads hold all the width of a part, not an arm of it, nor the air next to it."""
+    """Whether the pads hold the part over its whole width along `across`, not just one arm of it."""
     low, high = measure_extent(pieces, across)
     own = measure_held_width(pieces, tuple(point), tuple(across), tuple(up))
     return own is not None and own > (high - low) / 2 - _LESS_M
 
 
 def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[PadPlace, ...]:
-    """Places at which a gripper from above can hold a part, the best first: near the centre of mass, and not too low.
+    """List the places at which a gripper from above can hold a part, the best first.
+
+    Best means near the centre of mass in the plane, near the preferred height, narrow, and flat rather than along a
+    line.
 
     Args:
         up: The vertical, unit vector, (3,), frame of the part.
-        opening_m: Of each finger, [m].
-        over_m: So far over the top of the part tips may be; pads reach below them.
+        opening_m: Largest travel of each finger from the middle, [m].
+        over_m: How far the tips may be above the top of the part, [m]; the pads reach below the tips.
     """
     asks = solid, tuple(map(float, up)), opening_m, over_m
     if over_m > _PINCH_M:
@@ -119,10 +146,19 @@ def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -
 
 
 def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: float) -> bool:
-    """Whether pads that close on a point lie flat on the part, or on a shaft; arguments as in `find_holds`."""
+    """Whether pads that close on a point lie flat on the part, or along a line of a shaft.
+
+    Args:
+        point: The point between the tips, (3,), frame of the part, [m].
+        across: The direction along which the pads close, unit vector, (3,).
+        up: The vertical, unit vector, (3,), frame of the part.
+        opening_m: Largest travel of each finger from the middle, [m].
+    """
     along = np.cross(up, across)
     t, h, here = (float(point @ axis) for axis in (along, up, across))
-    for rim in (0.0, _RAY_M):  # what is just below the pads may join what they hold, or be in their way
+    # First exactly the pad, then a margin around it: material just below the pads may join what they hold, or block
+    # them, so either answer is accepted.
+    for rim in (0.0, _RAY_M):
         ends = (t - PAD_M[0] - rim, t + PAD_M[0] + rim), (h - PAD_M[1] - rim, h + PAD_M[2])
         columns, rows = (
             _lines(*each, [mid, *_round_axes(solid, axis, *each)], _PINCH_RAY_M)
@@ -135,13 +171,13 @@ def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: flo
 
 
 def _round_axes(solid: Solid, axis: Array, low: float, high: float) -> list[float]:
-    """Where the axes of round faces that lie square to an axis are along it, between two places."""
+    """Coordinates along `axis`, between low and high, of the axes of round faces that are perpendicular to it, [m]."""
     places = [float(f.point @ axis) for f in solid.rounds.values() if abs(f.axis @ axis) < _LEVEL]
     return [x for x in places if low < x < high]
 
 
 def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
-    """Where the middles of cylinders are along an axis, between two places."""
+    """Coordinates along `axis`, between low and high, of the centres of cylinders, [m]."""
     middles = [float(p.cylinder.center @ axis) for p in pieces if isinstance(p, Hull) and p.cylinder is not None]
     return [x for x in middles if low < x < high]
 
@@ -150,9 +186,13 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 def _places(
     solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float, ray_m: float
 ) -> tuple[PadPlace, ...]:
-    """`find_holds`, with rows of rays so far apart, [m]."""
+    """Search the holds for `find_holds`, best first, with rows of rays `ray_m` apart, [m].
+
+    The arguments are hashable, so that the result can be cached: `vertical` is `up`.
+    """
     up = np.array(vertical)
     bottom, top = measure_extent(solid.pieces, up)
+    # The preferred height, unless the pads would touch the ground or the palm the part there.
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
     least, step = (_LINE_M, _RAY_M) if over_m <= _PINCH_M else (_FINE_M, _PINCH_RAY_M)
     heights = _lines(bottom, max(top + over_m, best), [best], step)
@@ -168,6 +208,7 @@ def _places(
             for place in t:
                 for low, high, uneven in _offers(rays, place, tip, opening_m, least):
                     point = (low + high) / 2 * across + place * along + tip * up
+                    # Cost in metres: level distance from the centre of mass (1-norm), height, width, line contact.
                     off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
                     cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
                     candidates.append((round(cost, 9), PadPlace(point, across, (high - low) / 2)))
@@ -175,7 +216,11 @@ def _places(
 
 
 def _directions(solid: Solid, up: Array) -> Iterator[Array]:
-    """Level directions in which pads may close, each once up to its sign."""
+    """Level directions in which the pads may close: across flat faces, and across the walls of shafts.
+
+    A shaft that stands upright could be held in any direction; four directions, 45 degrees apart, stand for all. Each
+    direction comes once, whichever its sign.
+    """
     ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
     for face in (face for face in solid.rounds.values() if not face.hole and face.kind == "cylinder"):
         if abs(face.axis @ up) > 1.0 - _LEVEL:
@@ -189,11 +234,17 @@ def _directions(solid: Solid, up: Array) -> Iterator[Array]:
         way = way / np.linalg.norm(way)
         if all(abs(way @ other) < 1.0 - 1e-6 for other in kept):
             kept.append(way)
+            # Sign convention: the largest component is positive; + 0.0 turns -0 into 0.
             yield np.asarray(way * np.sign(way[np.abs(way).argmax()]) + 0.0)
 
 
 def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M) -> Array:
-    """Places from one end to the other, the middle among them, just inside, and some more."""
+    """Coordinates of grid lines from just inside `low` to just inside `high`, sorted, (k,), [m].
+
+    Args:
+        also: Further coordinates to include, such as those of axes of shafts.
+        ray_m: Largest spacing; there are at least nine lines, and one of them is the middle.
+    """
     middle = (low + high) / 2
     reach = (high - low) / 2 - 1e-6
     n = max(4, int(np.ceil(reach / ray_m)))
@@ -201,11 +252,15 @@ def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M
 
 
 def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
-    """Send rays along a direction through all places of a grid, each way in rising order."""
+    """Cast a grid of rays along `across` through the pieces.
+
+    Args:
+        t, h: Coordinates of the columns and rows of the grid, ascending, [m].
+    """
     along = np.cross(up, across)
     corners, first = collect_corners(pieces)
     (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
-    met = np.flatnonzero((t0 < t1) & (h0 < h1))
+    met = np.flatnonzero((t0 < t1) & (h0 < h1))  # pieces that at least one ray can hit
     T, H = np.meshgrid(t, h)
     start = T[..., None] * along + H[..., None] * up
     number = np.arange(T.size).reshape(T.shape)
@@ -217,11 +272,11 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
         rays.append(number[here].ravel()[hit])
         lows.append(enter[hit])
         highs.append(leave[hit])
-    # Of each ray what it passes through, one behind the other: most pass through few of many pieces.
+    # Pack the passages of each ray into the first columns of its row: most rays pass through few of many pieces.
     ray, low, high = (np.concatenate(each) for each in (rays, lows, highs))
     order = np.lexsort((low, ray))
     ray = ray[order]
-    place = np.arange(len(ray)) - np.searchsorted(ray, ray)
+    place = np.arange(len(ray)) - np.searchsorted(ray, ray)  # number of a passage within its ray
     ends = [np.full((T.size, int(place.max(initial=0)) + 1), empty) for empty in (np.inf, -np.inf)]
     for end, values in zip(ends, (low, high), strict=True):
         end[ray, place] = values[order]
@@ -229,13 +284,26 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
 
 
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Of rising places, the first in the shadow of each piece and the one behind its last."""
+    """For each piece, the range of grid coordinates inside its extent on an axis.
+
+    Args:
+        places: Grid coordinates, ascending, [m].
+        at: Coordinates of the corners of all pieces on the axis, piece by piece, [m].
+        first: Index of the first corner of each piece.
+
+    Returns:
+        Index of the first grid coordinate of each piece, and the index after its last.
+    """
     low = np.searchsorted(places, np.minimum.reduceat(at, first) - _ROUNDING_M)
     return low, np.searchsorted(places, np.maximum.reduceat(at, first) + _ROUNDING_M)
 
 
 def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """From where to where there is something, [m], one after the other; gaps that no finger fits into do not count."""
+    """Intervals of material along the rays, (begin, end), ascending, [m]; gaps too narrow for a finger are closed.
+
+    Args:
+        within: The rays to consider, (r,).
+    """
     low = rays.low[within]
     high = rays.high[within]
     there = np.isfinite(low)
@@ -244,6 +312,7 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
     order = np.argsort(low[there])
     low = low[there][order]
     reached = np.maximum.accumulate(high[there][order])
+    # A finger fits into a gap that is wider than the finger and its distance from the surface.
     apart = low[1:] >= reached[:-1] + _FINGER_M + FINGER_ROOM_M
     begins = np.append(low[0], low[1:][apart])
     ends = np.append(reached[:-1][apart], reached[-1])
@@ -251,8 +320,15 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
 
 
 def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> Iterator[tuple[float, float, bool]]:
-    """What pads between (t, h) can hold along so much, [m]: from where to where, and whether along a line only."""
+    """Intervals that pads with their tips at (t, h) can hold: (begin, end, line), [m], `line` if touched along one
+    only.
+
+    Args:
+        opening_m: Largest travel of each finger from the middle, [m].
+        least: Least length of the pressed area in one of its two directions, [m].
+    """
     side, down, over = PAD_M
+    # Rays at the fingers, from a margin below the pads upwards; those of them at pad height; those on the pad itself.
     above = (np.abs(rays.t - t) <= side + _RAY_M) & (rays.h >= h - down - _RAY_M)
     within = above & (rays.h <= h + over)
     on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
@@ -260,11 +336,13 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> 
     for low, high in _clusters(rays, within):
         if (high - low) / 2 + FINGER_ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
             continue
+        # First and last surface of each ray within this interval of material; passages outside count as NaN.
         own = np.where((enter >= low - 1e-9) & (leave <= high + 1e-9), 1.0, np.nan)
         with np.errstate(invalid="ignore"):
             first = np.fmin.reduce(enter * own, axis=1)
             last = np.fmax.reduce(leave * own, axis=1)
             pressed = on & (first < low + _FLAT_M) & (last > high - _FLAT_M)
+        # Something near the middle of the pad must be pressed, or the part would turn in the grip.
         if (np.abs(rays.t[within][pressed] - t) < side / 3).any():
             lengths = [float(np.ptp(places[within][pressed])) for places in (rays.t, rays.h)]
             if max(lengths) >= least:
@@ -272,7 +350,12 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> 
 
 
 def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
-    """Whether a finger, open or on its way down, would strike the part itself."""
+    """Whether the part itself blocks a finger next to the held interval, either open or on its way down.
+
+    Args:
+        above: The rays at the fingers and above them, (r,).
+        low, high: The held interval along the rays, [m].
+    """
     room = _FINGER_M + FINGER_ROOM_M
     beside = (low - room, low - 1e-6), (high + 1e-6, high + room)
     return any(bool(((rays.low[above] < end) & (rays.high[above] > begin)).any()) for begin, end in beside)

@@ -1,4 +1,8 @@
-"""How deep two solids of convex pieces are in each other, and how far one would fall before it meets the other."""
+"""Penetration depth of two solids of convex pieces by separating axes, and the drop height of one onto the other.
+
+The depth of two convex pieces is the least overlap of their projections over all separating axes. The depth of two
+solids is that of their deepest pair of pieces. Bounds from balls and axis-aligned boxes ("rooms") rule out most pairs.
+"""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -22,34 +26,35 @@ from apo_bench.geometry.convex import (
 from apo_bench.geometry.solid import Piece, Solid, all_boxes
 
 _TOUCHING_M = 1e-6
-"""Balls around solids are apart if this far from each other, whatever was rounded."""
+"""Solids whose enclosing balls are farther apart than this are apart; it absorbs rounding, [m]."""
 TOUCH_M = 1e-6
-"""Deeper than this a solid is in another one, and no longer next to it."""
+"""Depth above which a solid counts as inside another one; up to it they touch, [m]."""
 _STEP_M = 5e-4
-"""Places along a fall are so far apart: two boxes that together are thinner could pass each other unseen."""
+"""Coarse spacing of the heights tested along a fall, [m]: two boxes thinner than this together could be missed."""
 _MOST_PLACES = 10_000
+"""Most heights tested along a fall; a longer fall gets a coarser spacing."""
 _AT_ONCE = 100_000
+"""Pairs of pieces times heights that one batch of a fall computes, which bounds the memory."""
 _MOST_ROOMS = 4_000_000
-"""At most so many places, the farther apart; so many pairs of pieces are looked at together in a fall, and so many
-pairs times places elsewhere, which bounds the memory."""
+"""Pairs of pieces times places that one call computes elsewhere, which bounds the memory."""
 
 
 class WaysOut(NamedTuple):
-    """The directions in which one piece may leave another one."""
+    """The directions along which one piece can be moved out of another one, and how far."""
 
     directions: Array
-    """(k, 3), of the first piece, world, unit length."""
+    """Unit vectors in which the first piece moves out, (k, 3), world."""
     lengths: Array
-    """(k,), how far, [m]."""
+    """How far it has to move along each, (k,), [m]."""
     at: Array
-    """(3,): the middle of the smaller piece, world, [m]."""
+    """The centre of the smaller piece, (3,), world, [m]."""
 
 
 def measure_intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """The depth of the deepest pair of pieces of two posed solids, [m]; 0 if they are apart or only touch.
 
-    Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
-    of two edges. The depth is the shortest way out.
+    Separating axes: two convex pieces are apart if their projections are apart along a normal of a side or along a
+    cross product of two edges. The depth is the least overlap of the projections.
     """
     if measure_ball_distance(a.pieces, T_a, b.pieces, T_b) > _TOUCHING_M:
         return 0.0
@@ -65,22 +70,23 @@ def measure_intrusion_depths(
     apart_m: float = np.inf,
     measured_m: float = 0.0,
 ) -> Array:
-    """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
+    """How deep pieces `a` are in pieces `b` when `a` is put at each of k places; negative where they are apart.
 
     Args:
-        R_a: (3, 3), the orientation of `a`.
-        at: (k, 3), the places of the frame of `a`, [m].
-        apart_m: What is farther apart than this may count as so far apart, which takes less time.
-        measured_m: Pieces of which the upright boxes are farther apart than this may count as apart by that of these.
+        R_a: (3, 3), the orientation of `a`, the same at all places, world.
+        at: (k, 3), the positions of the frame of `a`, world, [m].
+        T_b: (4, 4), world pose of `b`, [m].
+        apart_m: The result may be cut off at -apart_m, which saves time.
+        measured_m: Pairs whose bounding volumes are farther apart than this may count by the distance of these instead.
 
     Returns:
-        (k,), [m].
+        The depth of the deepest pair at each place, (k,), [m].
     """
     if not (all_boxes(a) and all_boxes(b)):
         return _piece_by_piece(a, R_a, at, b, T_b, apart_m, measured_m)
     axes = box_axes(R_a, T_b[:3, :3])
-    # Two boxes are as deep in each other as their shadows on the axis on which that is least; pieces as their deepest
-    # pair.
+    # The depth of two boxes is the least overlap of their projections (min over axes); that of two solids is the depth
+    # of their deepest pair (max over pairs).
     reach = boxes_reach(a, R_a, b, T_b[:3, :3], axes)
     between = (boxes_around(a)[0] @ R_a.T)[:, None] - (boxes_around(b)[0] @ T_b[:3, :3].T + T_b[:3, 3])[None]
     apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
@@ -88,7 +94,13 @@ def measure_intrusion_depths(
 
 
 def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
-    """Of each pair of pieces of two posed solids that are deeper in each other, how they may be taken apart."""
+    """For each pair of pieces deeper in each other than `deep_m`, the directions and lengths to move the first piece
+    out.
+
+    Args:
+        T_a, T_b: World poses of the solids, (4, 4), [m].
+        deep_m: Pairs that are less deep in each other are left out, [m].
+    """
     R_a = T_a[:3, :3]
     R_b = T_b[:3, :3]
     if all_boxes(a.pieces) and all_boxes(b.pieces):
@@ -114,6 +126,14 @@ def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> 
 
 
 def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array, depths: Array) -> WaysOut:
+    """The ways out of one pair.
+
+    Args:
+        axes: Separating axes, (k, 3), world.
+        along: Coordinate of the centre of a relative to that of b on each axis, (k,), [m]; its sign says which way is
+            out.
+        depths: Overlap of the projections on each axis, (k,), [m].
+    """
     piece, T = (a, T_a) if a.half.max() < b.half.max() else (b, T_b)
     return WaysOut(axes * np.where(along < 0.0, -1.0, 1.0)[:, None], depths, pose.apply(T, piece.center[None])[0])
 
@@ -121,11 +141,10 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
 def _piece_by_piece(
     a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float, measured_m: float
 ) -> Array:
-    """`measure_intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by
-    how far these are apart.
+    """`measure_intrusion_depths` for pieces that are not all boxes.
 
-    No pair is deeper than its balls and boxes are in each other, nor than it is across its sides alone, so most need
-    not be looked at.
+    Distances of enclosing balls and of upright boxes, and the overlap across sides alone, bound the depth of a pair
+    from above. So most pairs need no test of all axes. Many places are split in halves to bound the memory.
     """
     pairs = _pairs(a, R_a, at, b, T_b, apart_m)
     if len(at) < 2 or len(at) * len(pairs) < _MOST_ROOMS:
@@ -144,9 +163,15 @@ def _measure(
     apart_m: float,
     measured_m: float,
 ) -> Array:
-    """The depth of the deepest of some pairs, (p, 2), at k places, (k,)."""
-    # Pairs that are surely apart count by their room; the others are measured, nearest first, and only at places where
-    # they may be deeper than what was found there before: first across sides, which bounds the depth from above.
+    """The depth of the deepest of some pairs of pieces at k places, (k,), [m].
+
+    Args:
+        pairs: (p, 2), the numbers of a piece of `a` and of a piece of `b`.
+        apart_m, measured_m: As in `measure_intrusion_depths`.
+    """
+    # Pairs that are surely apart count by the lower bound of their distance. The others are measured, nearest first,
+    # and only at places where they may be deeper than what was found there before. The normals of sides come first,
+    # since they bound the depth from above.
     rooms = _rooms(a, R_a, at, b, T_b, pairs)
     deepest = np.where(rooms > measured_m, -rooms, -np.inf).max(axis=1, initial=-apart_m)
     closest = rooms.min(axis=0, initial=np.inf)
@@ -167,7 +192,7 @@ def _measure(
 
 
 def _pairs(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float) -> Any:
-    """Pairs of pieces whose upright boxes come nearer to each other anywhere on the way, (p, 2)."""
+    """Pairs of pieces whose upright boxes, swept over all places, come nearer than `apart_m`: their numbers, (p, 2)."""
     mine, its = np.arange(len(a)), np.arange(len(b))
     if np.isinf(apart_m):
         return np.stack(np.meshgrid(mine, its, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -175,7 +200,7 @@ def _pairs(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
     slack = apart_m + TOUCH_M
     low_a, high_a = mid_a - half_a + at.min(axis=0) - slack, mid_a + half_a + at.max(axis=0) + slack
     low_b, high_b = mid_b - half_b + T_b[:3, 3], mid_b + half_b + T_b[:3, 3]
-    # First those of each side that come near to the box around all others, then pair by pair.
+    # First the pieces of each solid that come near the box around all pieces of the other, then pair by pair.
     its = its[((low_b < high_a.max(axis=0)) & (high_b > low_a.min(axis=0))).all(axis=1)]
     if not len(its):
         return np.zeros((0, 2), dtype=np.intp)
@@ -189,7 +214,10 @@ def _pairs(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 
 def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any) -> Array:
-    """How far apart pairs of pieces are at least, at k places, (k, p), [m]: by balls and upright boxes around them."""
+    """Lower bounds of the distance of each pair of pieces at each place, (k, p), [m]; negative where they may overlap.
+
+    The bound is the larger one of the distances of enclosing balls and of upright boxes.
+    """
     mine, its = pairs.T
     balls_a, radii_a = _balls(a)
     balls_b, radii_b = _balls(b)
@@ -215,7 +243,7 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
-    """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
+    """Centres and half sizes, (k, 3) each, [m], of world-aligned boxes around pieces turned by R about the origin."""
     corners, first = collect_corners(pieces)
     turned = corners @ R.T
     low = np.minimum.reduceat(turned, first)
@@ -224,7 +252,7 @@ def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
 
 
 def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
-    """How deep one piece is in another one along some axes, at k places, (k,), [m]; infinite along none."""
+    """The least overlap of the projections of two pieces over some axes, at k places, (k,), [m]; inf without axes."""
     middle_a, half_a = project_on_axes(a, R_a, axes)
     middle_b, half_b = project_on_axes(b, T_b[:3, :3], axes)
     apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
@@ -233,18 +261,18 @@ def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) 
 
 @lru_cache(maxsize=1024)
 def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
-    """Middles, (k, 3), and radii, (k,), of balls around pieces, in the frame of their solid."""
+    """Centres, (k, 3), and radii, (k,), of a ball around each piece, in the frame of the solid, [m]."""
     corners = [piece.corners for piece in pieces]
     radii = [np.linalg.norm(c - p.center, axis=1).max() for c, p in zip(corners, pieces, strict=True)]
     return copy_frozen([piece.center for piece in pieces], None, 3), copy_frozen(radii, None)
 
 
 def measure_upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
-    """The lowest and the highest corner, (3,) each, of the box around posed pieces whose sides are those of the world.
+    """The lowest and the highest corner, (3,) each, of the world-aligned box around all posed pieces, [m].
 
     Args:
-        R: (3, 3), their orientation.
-        at: (3,), the place of their frame, [m].
+        R: (3, 3), their orientation, world.
+        at: (3,), the position of their frame, world, [m].
     """
     if not all_boxes(pieces):
         corners = collect_corners(pieces)[0] @ R.T + at
@@ -256,13 +284,13 @@ def measure_upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tu
 
 
 def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
-    """How far `a` can go straight down until it meets `b`, to 2 um, [m]; infinite if it passes it by."""
+    """How far `a` can move down, along -z of the world, until it meets `b`, to 2 um, [m]; inf if it misses `b`."""
     low_a, high_a = measure_upright_bounds(a.pieces, T_a[:3, :3], T_a[:3, 3])
     low_b, high_b = measure_upright_bounds(b.pieces, T_b[:3, :3], T_b[:3, 3])
     if not ((low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2]):
         return np.inf
-    # Between the first and the last way at which the boxes around both may meet: first coarsely, then between the last
-    # place without and the first place with a meeting.
+    # The upright boxes bound the drop between low and high. A coarse search finds the first drop with contact, a fine
+    # one refines the interval between that and the drop before.
     low = max(0.0, float(low_a[2] - high_b[2]))
     high = float(high_a[2] - low_b[2])
     for step in (_STEP_M, TOUCH_M):
@@ -276,7 +304,9 @@ def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 
 def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
-    """The first of the places at which `a` is in `b`."""
+    """The index in `ways`, (k,), [m], of the first drop at which `a` is deeper in `b` than `TOUCH_M`; None if none
+    is.
+    """
     R_a, at = T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
     if all_boxes(a.pieces) and all_boxes(b.pieces):
         pairs, many = None, len(a.pieces) * len(b.pieces)
@@ -297,5 +327,5 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
 
 
 def measure_drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
-    """How deep `a` is in `b` once it went down so far, (k,), [m]; negative where they are apart."""
+    """How deep `a` is in `b` after each of k drops along -z of the world, (k,), [m]; negative where they are apart."""
     return measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0)), b.pieces, T_b)

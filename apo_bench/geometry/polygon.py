@@ -1,4 +1,4 @@
-"""Flat areas: their rings, their corners, and a plane to draw them in."""
+"""Plane polygons: directions in a plane, conversion to and from shapely, and corners without straight-edge points."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -9,31 +9,37 @@ from numpy.typing import NDArray
 from apo_bench.geometry.arrays import Array
 
 _STRAIGHT_M = 1e-9
-"""A point this near to the line through its neighbours is no corner."""
+"""A point closer than this to the line through its neighbours is no corner, [m]."""
 
 
 def find_direction_across(axis: Array, toward: Array | None = None) -> Array:
-    """A unit vector across an axis, (3,): what is across it of a direction; none: of the most so axis of the frame."""
+    """A unit vector perpendicular to a unit axis, (3,).
+
+    Args:
+        toward: The direction whose perpendicular component is taken; None: the frame axis most nearly perpendicular.
+    """
     x = np.eye(3)[int(np.abs(axis).argmin())] if toward is None else toward
     x = x - (x @ axis) * axis
     return np.asarray(x / np.sqrt(x @ x))
 
 
 def find_plane_across(n: Array) -> Array:
-    """Two directions across a normal, (3,), as columns, (3, 2): with it they make a right-handed frame."""
+    """Two unit vectors perpendicular to a normal, (3,), as columns, (3, 2); with it they make a right-handed frame."""
     u = find_direction_across(n)
     return np.column_stack([u, np.cross(n, u)])
 
 
 def make_flat_area(outline: Array, holes: Sequence[Array], to_plane: Array) -> Any:
-    """Rings of corners, (k, 3) each, as a shapely polygon in the plane of two directions, (3, 2)."""
+    """Project rings of corners, (k, 3) each, onto the two directions of a plane, (3, 2), as a shapely polygon with
+    holes.
+    """
     from shapely import Polygon
 
     return Polygon(outline @ to_plane, [hole @ to_plane for hole in holes])
 
 
 def list_polygons(shape: Any) -> Iterator[Any]:
-    """The polygons in a shapely geometry; points and lines are left out."""
+    """The polygons in a shapely geometry, nested ones too; points and lines are left out."""
     if shape.geom_type == "Polygon":
         yield shape
     for part in getattr(shape, "geoms", ()):
@@ -61,13 +67,13 @@ def straighten(ring: Array) -> Array:
 
 
 def find_corners(points: Array, ring: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Which points of closed rings are no points in the middle of straight edges, (k,), as in `straighten`.
+    """Which points of closed rings are corners, (k,): not points in the middle of straight edges. See `straighten`.
 
     Args:
         points: (k, 2), ring by ring, each point once, [m].
         ring: (k,), the number of the ring of each point, ascending.
     """
-    # The neighbours of a point are those beside it, but for the first and the last point of a ring, which meet.
+    # The neighbours of a point are the rows before and after it, except that the last point of a ring meets its first.
     last = np.append(ring[1:] != ring[:-1], True)[: len(ring)]
     ends = last.nonzero()[0]
     begins = np.append(0, ends + 1)[: len(ends)]
@@ -80,4 +86,5 @@ def find_corners(points: Array, ring: NDArray[np.intp]) -> NDArray[np.bool_]:
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     chord = np.maximum(np.hypot(*(before + after).T), _STRAIGHT_M)
     corners = np.abs(across) > _STRAIGHT_M * chord
+    # A ring with fewer than three corners is a sliver and keeps all its points.
     return corners | (np.bincount(ring, corners, minlength=1) <= 2)[ring]

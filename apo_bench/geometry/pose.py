@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from apo_bench.geometry.arrays import Array
 
 FARTHEST_M = 1e4
-"""Nothing is farther from the origin: beyond it, rounding is no longer small."""
+"""Largest distance from the origin, [m]; beyond it rounding is no longer small."""
 _ONE = np.eye(4)
+"""The identity pose."""
 _NOT_ORTHOGONAL = 1e-6
-"""How far R R^t may be from the identity."""
+"""Largest entry of R R^t - 1 of a rotation."""
 _ROUNDING = 1e-9
-"""A component of a quaternion that is nearer to zero has no sign."""
+"""A component of a quaternion closer to zero than this has no sign."""
 
 
 def rigid(R: ArrayLike, t: ArrayLike) -> Array:
@@ -113,9 +114,10 @@ def turn_deg(T: ArrayLike) -> Array:
 
 
 def pack(T: ArrayLike) -> Array:
-    """`(x, y, z, qw, qx, qy, qz)`, (*, 4, 4) -> (*, 7): of q and -q, the one whose first component is above 0.
+    """Poses as `(x, y, z, qw, qx, qy, qz)`, (*, 4, 4) -> (*, 7).
 
-    What is zero up to rounding does not count, so a half turn has one sign however it was computed.
+    Of q and -q, which are the same rotation, the one whose first component is positive is taken. Components that are
+    zero up to rounding do not count, so a half turn has one sign however it was computed.
     """
     from scipy.spatial.transform import Rotation
 
@@ -141,16 +143,19 @@ def unpack(pose: ArrayLike) -> Array:
 
 
 def nearest_rotations(R: Array) -> Array:
-    """The matrices of orthonormal columns that are nearest to matrices (n, 3, 3), in the sense of least squares.
+    """The orthonormal matrices nearest to matrices, (n, 3, 3), in the sense of least squares.
 
     With R = U S V^t, U V^t minimises the sum of squared differences among all orthonormal matrices (Schoenemann, 1966).
+    The determinant may be -1.
     """
     U, _, Vt = np.linalg.svd(R)
     return np.asarray(U @ Vt)
 
 
 def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
-    """Whether each matrix, (n, 4, 4), is a proper rigid displacement, -> (n,); numbers that are not finite are not."""
+    """Whether each matrix, (n, 4, 4), is a rigid displacement, not a reflection, (n,); False if a number is not
+    finite.
+    """
     T = np.asarray(T, dtype=np.float64)
     n = len(T)
     finite = np.isfinite(T).reshape(n, 16).all(axis=1)
@@ -163,7 +168,7 @@ def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
 
 
 def apply(T: ArrayLike, points: ArrayLike) -> Array:
-    """Points (k, 3) taken through one pose (4, 4), -> (k, 3)."""
+    """Points, (k, 3), transformed by one pose, (4, 4): (k, 3)."""
     T = np.asarray(T, dtype=np.float64)
     return np.asarray(points, dtype=np.float64) @ T[:3, :3].T + T[:3, 3]
 
@@ -180,6 +185,7 @@ def _series(angle: Array) -> tuple[Array, Array, Array]:
 
 
 def _turn(axis: int, degrees: float) -> Array:
+    """The rotation about axis 0, 1 or 2 (x, y, z), (3, 3); exact for multiples of 90 degrees."""
     quarter = round(degrees / 90.0)
     if degrees == 90.0 * quarter:
         c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]

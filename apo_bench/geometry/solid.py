@@ -1,4 +1,4 @@
-"""Solids and their named faces, in the frame of the solid, [m]."""
+"""Shape of a rigid part: named flat and round faces, and convex pieces whose union it is, in its own frame, [m]."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from apo_bench.geometry.round_face import RoundFace
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A flat polygon, convex or not, with or without holes, that looks outwards along its normal."""
+    """A flat polygon, convex or not, with or without holes; its normal points out of the solid."""
 
     name: str
     outline: Array
@@ -24,11 +24,13 @@ class Face:
     holes: tuple[Array, ...] = ()
     """Corners of each hole, shape (k, 3), clockwise seen from outside, [m]."""
     fit: bool = False
-    """The physical part recedes here by the clearance; the nominal face does not."""
+    """Whether the physical part recedes here by the clearance; the nominal face does not."""
     stated_normal: Array | None = None
-    """Of a sheet, whose corners need not make a polygon: points, or the ends of a line."""
+    """The normal of a sheet (`apo_bench.assembly.projection`), whose corners may be points or the ends of a line; else
+    None."""
     opposes: bool = True
-    """Whether what touches it looks the other way; a plane through an axis has two equal sides."""
+    """Whether a touching face must have the opposite normal; False for a plane through an axis, whose sides are
+    equal."""
 
     def __post_init__(self) -> None:
         freeze(self, outline=(None, 3))
@@ -60,52 +62,55 @@ class Box:
 
     name: str
     center: Array
+    """(3,), [m]."""
     half: Array
+    """Half the size along each axis, (3,), [m]."""
 
     def __post_init__(self) -> None:
         freeze(self, center=(3,), half=(3,))
 
     @cached_property
     def corners(self) -> Array:
-        """(8, 3), [m]."""
+        """The corners, (8, 3), [m]."""
         signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
         return copy_frozen(self.center + signs * self.half, 8, 3)
 
     @cached_property
     def planes(self) -> Array:
-        """Its sides, (6, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
+        """The sides, +x, +y, +z, -x, -y, -z, (6, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
         n = np.concatenate([np.eye(3), -np.eye(3)])
         return copy_frozen(np.column_stack([n, n @ self.center + np.tile(self.half, 2)]), 6, 4)
 
     @property
     def normals(self) -> Array:
-        """Directions across its sides, (3, 3), each once up to its sign."""
+        """Normals of the sides, (3, 3), each direction once, whichever its sign."""
         return np.eye(3)
 
     @property
     def edges(self) -> Array:
-        """Directions of its edges, (3, 3), each once up to its sign."""
+        """Directions of the edges, (3, 3), each once, whichever its sign."""
         return np.eye(3)
 
 
 Piece = Box | Hull
-"""A convex piece of a solid. Both have `corners`, `planes`, `normals`, `edges`, and `center` and `half` of the aligned
-box that it is or that is around it."""
+"""A convex piece of a solid. Both types have `corners`, `planes`, `normals`, `edges`, and `center` and `half` of the
+axis-aligned box around the piece."""
 
 
 @lru_cache(maxsize=4096)
 def all_boxes(pieces: tuple[Piece, ...]) -> bool:
-    """Whether there is nothing but boxes."""
+    """Whether all pieces are boxes, which allows faster formulas."""
     return all(isinstance(piece, Box) for piece in pieces)
 
 
 def measure_extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
-    """How far pieces reach along a direction, (3,), of their own frame: the least and the greatest coordinate, [m]."""
+    """The least and the greatest coordinate of pieces along a direction, (3,), of their own frame, [m]."""
     ends = [_ends(piece, along) for piece in pieces]
     return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
 
 
 def _ends(piece: Piece, along: Array) -> tuple[float, float]:
+    """The least and the greatest coordinate of one piece along a direction, [m]."""
     if isinstance(piece, Hull):
         heights = piece.corners @ along
         return float(heights.min()), float(heights.max())
@@ -122,16 +127,17 @@ class Solid:
 
     name: str
     faces: Mapping[str, Face]
-    """The flat ones."""
+    """Flat faces by name."""
     pieces: tuple[Piece, ...]
+    """Convex pieces, whose union is the solid."""
     centroid: Array
     """Centre of volume of the union, (3,), [m]; the centre of mass, since parts are homogeneous."""
     volume: float
     """[m^3]."""
     rounds: Mapping[str, RoundFace] = field(default_factory=dict)
-    """The faces of revolution; no name is in `faces` and here."""
+    """Round faces by name; no name is in `faces` as well."""
     inertia: Array | None = None
-    """Of density 1 about the centroid, (3, 3), [m^5]; None: that of its boxes, which do not overlap."""
+    """Inertia matrix about the centroid at density 1, (3, 3), [m^5]; None: that of the boxes, which do not overlap."""
 
     def __post_init__(self) -> None:
         freeze(self, centroid=(3,), inertia=(3, 3), faces=None, rounds=None)
@@ -142,7 +148,7 @@ class Solid:
         return any(f.fit for f in self.faces.values()) or any(f.fit for f in self.rounds.values())
 
     def face(self, name: str) -> Face | RoundFace:
-        """A face, flat or round.
+        """The face with a name, flat or round.
 
         Raises:
             KeyError: There is none of this name.
@@ -158,6 +164,6 @@ class Solid:
 
 
 def measure_world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:
-    """The lowest and the highest corner, (3,) each, of the box around posed solids, world frame, [m]."""
+    """The lowest and the highest corner, (3,) each, of the world-aligned box around posed solids, [m]."""
     ends = np.array([[np.add(measure_extent(solid.pieces, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
     return ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)

@@ -1,7 +1,10 @@
-"""Pieces moved along a straight line against pieces that rest: exactly where they meet, and where they come free.
+"""Exact contact intervals of convex pieces moved along a straight line, and the distance at which parts come free.
 
-Two convex pieces overlap where their shadows do along every separating axis; along a line each shadow does so in an
-interval, so each pair of pieces meets in one interval of the way.
+Two convex pieces overlap where their projections overlap on every separating axis. Along a line each projection
+overlaps in one interval, so a pair of pieces meets in one interval of the way, the intersection of these.
+
+In this file `way` is the unit vector of the motion, (3,), world. `slack_m` shrinks the pieces by so much before they
+are compared; a negative value makes them larger.
 """
 
 from collections.abc import Sequence
@@ -26,13 +29,15 @@ from apo_bench.geometry.polygon import find_plane_across
 from apo_bench.geometry.solid import Piece, all_boxes
 
 _ROUNDING_M = 1e-9
+"""Slack of the comparisons of extents that rule out pairs of pieces, [m]."""
 _SLACK_M = 5e-5
-"""Pieces are less than this deep in each other where they touch."""
+"""Depth up to which two pieces only touch, [m]."""
 _ANYWHERE = (-np.inf, np.inf)
+"""The whole line, as an interval of the way."""
 
 
 class PosedPieces(NamedTuple):
-    """The pieces of a part somewhere."""
+    """The convex pieces of a part, and its pose."""
 
     pieces: tuple[Piece, ...]
     T: Array
@@ -42,12 +47,20 @@ class PosedPieces(NamedTuple):
 def _box_spans(
     moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, within: tuple[float, float] = _ANYWHERE
 ) -> tuple[NDArray[np.intp], Array]:
-    """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
+    """Intervals of the way in which the boxes around pairs of pieces overlap.
+
+    Args:
+        within: Interval of the way that matters, [m]; pairs that meet only outside it may be left out.
+
+    Returns:
+        The number of each pair, (k,), i * (number of resting pieces) + j, and begin and end of its interval, (k, 2),
+        [m].
+    """
     a, b = (pose.apply(of.T, boxes_around(of.pieces)[0]) for of in (moving, resting))
     R_a, R_b = (of.T[:3, :3] for of in (moving, resting))
     axes = box_axes(R_a, R_b)
     halves = [boxes_around(of.pieces)[1] @ np.abs(axes @ of.T[:3, :3]).T for of in (moving, resting)]
-    # Most pairs of many pieces pass each other by, seen along the way.
+    # Most pairs miss each other, seen along the way, and are ruled out first.
     i, j = _side_by_side(moving, way, resting, slack_m, within)
     at = (a @ axes.T)[i] - (b @ axes.T)[j]
     kept, spans = _intervals(at, axes @ way, halves[0][i] + halves[1][j] - slack_m)
@@ -57,12 +70,15 @@ def _box_spans(
 def _side_by_side(
     moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, within: tuple[float, float]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of pieces that may meet on a line, (k,) each: their shadows square to it do, and those along it in time."""
+    """Numbers of a moving and of a resting piece, (k,) each, of the pairs that may meet within an interval of the way.
+
+    Their extents overlap on two axes perpendicular to the way, and on the way within that interval.
+    """
     if all_boxes(moving.pieces) and all_boxes(resting.pieces):
         every = np.indices((len(moving.pieces), len(resting.pieces))).reshape(2, -1)
         return every[0], every[1]
     near = np.ones((len(moving.pieces), len(resting.pieces)), dtype=np.bool_)
-    room = _ROUNDING_M - min(10.0 * slack_m, 0.0)
+    room = _ROUNDING_M - min(10.0 * slack_m, 0.0)  # with a negative slack, pieces reach farther
     for axis, (begin, end) in zip((*find_plane_across(way).T, way), ((0.0, 0.0), (0.0, 0.0), within), strict=True):
         (low_a, high_a), (low_b, high_b) = (_ends(of, axis) for of in (moving, resting))
         near &= low_a[:, None] + begin < high_b + room
@@ -72,14 +88,20 @@ def _side_by_side(
 
 
 def _ends(of: PosedPieces, axis: Array) -> tuple[Array, Array]:
-    """From where to where each piece is along an axis, (k,) each."""
+    """Least and greatest coordinate of each piece on an axis, (k,) each, world, [m]."""
     corners, first = collect_corners(of.pieces)
     along = corners @ (of.T[:3, :3].T @ axis) + of.T[:3, 3] @ axis
     return np.minimum.reduceat(along, first), np.maximum.reduceat(along, first)
 
 
 def _exactly(moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, pair: int) -> Array:
-    """Where the pieces of a pair meet, (1, 2), or nowhere, (0, 2): across their sides, then across edges."""
+    """The interval of the way in which one pair of pieces overlaps, (1, 2), [m]; (0, 2) if there is none.
+
+    Cross products of edges are tested only if the projections on the normals of sides overlap somewhere.
+
+    Args:
+        pair: The number of the pair, as returned by `_box_spans`.
+    """
     a, b = (of.pieces[i] for of, i in zip((moving, resting), divmod(pair, len(resting.pieces)), strict=True))
     R_a = moving.T[:3, :3]
     R_b = resting.T[:3, :3]
@@ -102,12 +124,12 @@ def _exactly(moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: flo
 
 
 def is_way_free(moving: Sequence[PosedPieces], way: Array, length_m: float, resting: Sequence[PosedPieces]) -> bool:
-    """Whether parts can be moved so far as one without coming into any other."""
+    """Whether parts, moved together as one by `length_m` along `way`, collide with none of the resting parts."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
             pairs, spans = _box_spans(m, way, r, _SLACK_M, (0.0, length_m))
             if not (all_boxes(m.pieces) and all_boxes(r.pieces)):
-                # One pair that meets is enough: those first whose boxes do so along most of the way.
+                # One pair that meets is enough, so the pairs whose boxes overlap longest are tested first.
                 meet = np.minimum(spans[:, 1], length_m) - np.maximum(spans[:, 0], 0.0)
                 order = np.flatnonzero(meet > 0.0)
                 order = order[np.argsort(-meet[order], kind="stable")]
@@ -119,14 +141,15 @@ def is_way_free(moving: Sequence[PosedPieces], way: Array, length_m: float, rest
 
 
 def _within(spans: Array, length_m: float) -> bool:
-    """Whether any of some spans, (k, 2), begins before the end of a way, and ends behind its begin."""
+    """Whether one of some intervals, (k, 2), overlaps the interval from 0 to `length_m`."""
     return bool(((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any())
 
 
 def compute_exit_distance(moving: Sequence[PosedPieces], way: Array, resting: Sequence[PosedPieces]) -> float:
-    """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap.
+    """How far parts, moved together as one along `way`, must go until they touch no resting part any more, [m].
 
-    Pieces that are no boxes are compared by the boxes around them first, those that go on the longest before others.
+    Only the overlap that begins at the start counts. Pairs other than boxes are compared by the boxes around them
+    first, the latest to come free first, and exactly only where that matters.
     """
     spans = list[Array]()
     exact = list[bool]()
@@ -153,7 +176,7 @@ def compute_exit_distance(moving: Sequence[PosedPieces], way: Array, resting: Se
 
 
 def _near(moving: PosedPieces, way: Array, length_m: float, resting: PosedPieces) -> bool:
-    """Whether balls around two parts come near each other on the way; most parts are far away."""
+    """Whether the balls around two parts meet anywhere on the way; rules out most pairs of parts."""
     middle_a, r_a = enclose_in_ball(moving.pieces)
     middle_b, r_b = enclose_in_ball(resting.pieces)
     a = moving.T[:3, :3] @ middle_a + moving.T[:3, 3]
@@ -163,10 +186,18 @@ def _near(moving: PosedPieces, way: Array, length_m: float, resting: PosedPieces
 
 
 def _intervals(at: Array, speed: Array, reach: Array) -> tuple[NDArray[np.intp], Array]:
-    """Where |at + s speed| < reach holds along all axes at once: (k, axes) -> which rows, (l,), and from and until,
-    (l, 2); rows where it holds nowhere are left out."""
-    # It holds between s = (-reach - at) / speed and s = (reach - at) / speed, in either order; where the speed is zero
-    # always or never.
+    """Intervals of s in which |at + s * speed| < reach holds for all axes at once.
+
+    Args:
+        at: Distance of the centres of each pair on each axis at s = 0, (k, axes), [m].
+        speed: Its change per metre of the way, (axes,).
+        reach: Sum of the half lengths of the projections, (k, axes), [m].
+
+    Returns:
+        The rows for which there is an interval, (l,), and begin and end of each, (l, 2), [m].
+    """
+    # The condition holds between s = (-reach - at) / speed and s = (reach - at) / speed, in either order; where the
+    # speed is zero it holds always or never.
     still = np.abs(speed) < 1e-9
     apart = (np.abs(at) >= reach) & still
     rate = np.where(still, 1.0, speed)

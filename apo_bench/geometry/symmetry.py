@@ -1,4 +1,7 @@
-"""The turns after which a part looks the same: few of most parts, any about its axis of a part of revolution."""
+"""Exact symmetries of a part: rotations after which it looks the same, and the nearest pose that looks like another.
+
+Most parts have a few; a part of revolution may be turned about its axis by any angle.
+"""
 
 from functools import lru_cache
 from itertools import permutations, product
@@ -15,38 +18,39 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid, all_boxes
 
 _SAME_M = 1e-6
-"""Corners of boxes that are nearer than this have the same coordinate."""
+"""Coordinates of corners closer than this are equal, [m]."""
 _ONE_LINE_M = 1e-5
+"""Lines closer than this are the same axis, [m]; distances from an axis that differ by less are equal."""
 _SAME = 1e-10
-"""Lines that are nearer are one line, [m]; cosines nearer to 1 are of one direction."""
+"""Two unit vectors are parallel if the absolute value of their cosine is above 1 minus this."""
 _FEWEST = 8
-"""Sides of a polygon that may stand for a circle; coarse walls, that no contact needs, have so many."""
+"""Least number of sides of a polygon that may stand for a circle: walls without contacts are as coarse as this."""
 _COARSE = 1.0 / np.cos(np.pi / _FEWEST) - 1.0
-"""So much of its radius is then in doubt of a wall."""
+"""Difference between the outer and the inner radius of such a polygon, as a fraction of the radius."""
 _TURNS = (0.41, 1.37, 2.71)
-"""Turns that carry no polygon of few sides onto itself, [rad]."""
+"""Test angles that map no regular polygon of few sides onto itself, [rad]."""
 _EVEN = 1e-3
-"""Moments of inertia about axes across are the same within this part of their sum."""
+"""Tolerance when moments of inertia are compared, as a fraction of their sum."""
 
 
 class Revolution(NamedTuple):
-    """The axis of a part of revolution, in its frame."""
+    """The axis of revolution of a part, in the frame of the part."""
 
     point: Array
-    """(3,), [m]: its centre of volume."""
+    """The centre of volume, a point of the axis, (3,), [m]."""
     axis: Array
-    """(3,), unit vector."""
+    """Unit vector, (3,)."""
     reversible: bool
-    """Whether it is the same end for end, too."""
+    """Whether the part looks the same after a half turn that swaps the two ends of the axis."""
 
 
 @lru_cache(maxsize=256)
 def find_revolution(solid: Solid) -> Revolution | None:
-    """The axis about which a part may be turned by anything; None if it has none.
+    """The axis about which a part may be turned by any angle; None if there is none.
 
-    All round faces are whole and about this axis, flat ones lie across it and are round themselves, and what the pieces
-    fill, and the inertia if it is stated, stay as they are. Round walls are flat ones of pieces, so what these fill is
-    known within 8 % of the largest radius.
+    All round faces must be whole turns about this axis. Flat faces must be perpendicular to it and bounded by circles
+    about it. The pieces must fill the same space after a turn, and the inertia, if stated, must stay the same. Round
+    walls of pieces are polygons, so the filled space is checked only to 8 % of the largest radius.
     """
     rounds = list(solid.rounds.values())
     if not rounds or not all(_about(wall, solid.centroid, rounds[0].axis) for wall in rounds):
@@ -68,22 +72,33 @@ def find_revolution(solid: Solid) -> Revolution | None:
 
 
 def make_turn(point: Array, axis: Array, angle_rad: float) -> Array:
-    """The displacement by a turn about an axis through a point, (4, 4)."""
+    """The rotation about an axis through a point as a displacement, (4, 4).
+
+    Args:
+        point: A point of the axis, (3,), [m].
+        axis: Unit vector, (3,).
+    """
     spin = np.concatenate([np.zeros(3), axis * angle_rad])
     return np.asarray(pose.at(point) @ pose.exp(spin) @ pose.at(-point))
 
 
 def find_least_turned(solid: Solid, T: Array, true: Array) -> Array:
-    """The pose, (4, 4), at which a part of revolution looks as it does at T, turned the least from another pose.
+    """The pose among those that look like T, of a part of revolution, that is rotated least relative to another pose.
 
-    Of that one the rotation (3, 3) is enough; of several, (*, 3, 3), each has a pose, (*, 4, 4). Any other part stays
-    as it is.
+    A part without an axis of revolution keeps T. The centre of volume does not move.
+
+    Args:
+        T: The observed pose, (4, 4), [m].
+        true: Rotation or pose to compare with, (3, 3) or (4, 4); or several of them, (*, 3, 3) or (*, 4, 4).
+
+    Returns:
+        (4, 4), or (*, 4, 4) for several; T itself, (4, 4), if the part has no axis of revolution.
     """
     about = find_revolution(solid)
     if about is None:
         return T
-    # What is left between the two, M, is to turn the least: of both ways round, the turn about the axis with the
-    # greatest trace. The centre of volume stays where it is observed.
+    # M is the rotation from the other pose to T. Of all turns about the axis, with and without swapped ends, the one
+    # for which M times it has the greatest trace leaves the least angle. The centre of volume stays where it is.
     M = np.swapaxes(true[..., :3, :3], -1, -2) @ T[:3, :3]
     a = about.axis
     across = find_direction_across(a)
@@ -95,7 +110,11 @@ def find_least_turned(solid: Solid, T: Array, true: Array) -> Array:
 
 
 def _least_turn(M: Array, axis: Array) -> Array:
-    """The rotation about an axis, (*, 3, 3), for which M times it turns the least: the greatest trace."""
+    """The rotation R about an axis, (*, 3, 3), for which M R has the least angle, that is, the greatest trace.
+
+    Args:
+        M: Rotations, (*, 3, 3).
+    """
     # trace(M R(t)) = c + (trace(M) - a . M a) cos t + trace(M K) sin t, which is greatest at this t.
     K = pose.hat(axis)
     angle = np.arctan2((M * K.T).sum(axis=(-2, -1)), np.trace(M, axis1=-2, axis2=-1) - (M @ axis) @ axis)
@@ -103,20 +122,20 @@ def _least_turn(M: Array, axis: Array) -> Array:
 
 
 def _about(face: RoundFace, point: Array, axis: Array) -> bool:
-    """Whether a face goes all around an axis through a point."""
+    """Whether a round face is a whole turn about the axis through a point."""
     off = np.cross(face.point - point, axis)
     return bool(face.toward is None and abs(face.axis @ axis) > 1.0 - _SAME and np.sqrt(off @ off) < _ONE_LINE_M)
 
 
 def _is_circle(about: Revolution, loop: Array) -> bool:
-    """Whether corners, (k, 3), lie on a circle about the axis, and are as many as a coarse wall has at least."""
+    """Whether corners, (k, 3), lie on a circle about the axis, and are at least `_FEWEST`."""
     far = np.linalg.norm(np.cross(loop - about.point, about.axis), axis=1)
     return len(loop) >= _FEWEST and float(np.ptp(far)) <= _ONE_LINE_M
 
 
 @lru_cache(maxsize=1)
 def list_quarter_turns() -> Array:
-    """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
+    """The 24 rotations that map the axes of a frame onto each other, (24, 3, 3), the identity first."""
     ways = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
     signed = [np.eye(3)[list(order)] * np.array(signs)[:, None] + 0.0 for order, signs in ways]
     return copy_frozen([R for R in signed if np.linalg.det(R) > 0.0])
@@ -124,15 +143,14 @@ def list_quarter_turns() -> Array:
 
 @lru_cache(maxsize=256)
 def find_symmetries(solid: Solid) -> Array:
-    """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
+    """The displacements g, in the frame of a solid, after which it fills the same space, (m, 4, 4), the identity first.
 
-    Fit faces lie on fit faces then, too: a part that recedes on one side only does not look the same from both.
-    A union of axis-aligned boxes has faces towards both ends of all three axes and no others, so a turn that leaves it
-    as it is carries axes onto axes: the 24 quarter turns about the centre of volume are all that can. Names of faces
-    do not count. Observed at `T g` it looks as it does at `T`.
+    Observed at `T g` the solid looks as it does at `T`. Fit faces must map onto fit faces too, since a part that
+    recedes on one side only does not look the same from both. Names of faces do not count.
 
-    A solid of other pieces or with round faces is turned by where its faces can go (`exact_turns`). Of a part of
-    revolution, which has any number of them, those are here that turn its axis: none but the identity, or one more.
+    For a union of axis-aligned boxes only the 24 quarter turns about the centre of volume can be symmetries: its faces
+    point along both senses of all three axes and nowhere else. For other solids see `exact_turns`. A part of revolution
+    has infinitely many; here they are the identity and, if its ends can be swapped, one half turn that swaps them.
     """
     if solid.rounds or not all_boxes(solid.pieces):
         about = find_revolution(solid)
@@ -144,14 +162,19 @@ def find_symmetries(solid: Solid) -> Array:
 
 
 def _over(about: Revolution) -> Array:
-    """The turn, (4, 4), that puts a part of revolution upside down."""
+    """The half turn, (4, 4), that swaps the ends of a part of revolution."""
     return make_turn(about.point, find_direction_across(about.axis), np.pi)
 
 
 def find_nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
-    """The pose, (4, 4), at which a solid looks as it does at T, turned least away from an expected pose (4, 4).
+    """The pose among those at which a solid looks as it does at T that is rotated least relative to an expected pose.
 
-    Of several expected poses, (*, 4, 4), each has a pose. Any turn about an axis of revolution looks the same.
+    Args:
+        T: The observed pose, (4, 4), [m].
+        expected: One pose, (4, 4), or several, (*, 4, 4); each gets its own nearest pose.
+
+    Returns:
+        (4, 4) or (*, 4, 4); any angle about an axis of revolution looks the same.
     """
     if find_revolution(solid) is not None:
         return find_least_turned(solid, T, expected)
@@ -160,58 +183,73 @@ def find_nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
 
 
 def count_folds(symmetric: Array) -> Array:
-    """How often a part looks the same in a whole turn about each axis of its frame, (3,): 1, 2 or 4.
+    """How many times a part looks the same during a whole turn about each axis of its frame, (3,): 1, 2 or 4.
 
     Args:
         symmetric: (m, 4, 4), from `find_symmetries`.
     """
+    # A rotation about axis i leaves entry (i, i) at exactly 1; symmetric[0] is the identity, which counts as 1.
     return np.array([1.0 + sum(R[i, i] == 1.0 for R in symmetric[1:, :3, :3]) for i in range(3)])
 
 
 def nearest_symmetry(symmetric: Array, off: Array) -> Array:
-    """For each displacement (n, 4, 4), the symmetry g (n, 4, 4) for which `off @ g` turns the least.
+    """For each displacement, (n, 4, 4), the symmetry g, (n, 4, 4), for which `off @ g` has the smallest rotation angle.
 
-    Of several that are as good the first is taken, which is the identity wherever that is one of them.
+    Ties go to the first symmetry, which is the identity if it is among them.
     """
-    # trace(R) = 1 + 2 cos(angle): the least turn has the greatest trace.
+    # trace(R) = 1 + 2 cos(angle): the smallest angle has the greatest trace.
     traces = np.einsum("nij,mji->nm", off[:, :3, :3], symmetric[:, :3, :3])
     close = traces >= traces.max(axis=1, keepdims=True) - 1e-12
     return np.asarray(symmetric[np.argmax(close, axis=1)])
 
 
 def find_nearest_symmetric_pose(T: Array, symmetric: Array, expected: Array) -> Array:
-    """The pose T g, (4, 4), that looks like T and is turned least away from an expected rotation (3, 3)."""
+    """The pose T g, (4, 4), that is rotated least relative to an expected rotation, (3, 3).
+
+    Args:
+        T: The observed pose, (4, 4), [m].
+        symmetric: The symmetries g, (m, 4, 4), from `find_symmetries`.
+    """
     poses = T @ symmetric
     return np.asarray(poses[np.einsum("nij,ij->n", poses[:, :3, :3], expected).argmax()])
 
 
 def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:
-    """Whether two unions of boxes, each a centre and half sizes, fill the same space: cell by cell of their grid."""
+    """Whether two unions of boxes fill the same space, compared cell by cell on the grid of all their faces.
+
+    Args:
+        a, b: Centre and half sizes of each box, (3,) each, [m].
+    """
     cuts = [_cuts(np.array([at[i] + s * half[i] for at, half in a + b for s in (-1.0, 1.0)])) for i in range(3)]
     middles = [(cut[1:] + cut[:-1]) / 2 for cut in cuts]
     return bool(np.array_equal(_fill(a, middles), _fill(b, middles)))
 
 
 def _keeps_fit(solid: Solid, g: Array) -> bool:
-    """Whether a displacement that leaves the space as it is carries every fit face onto a fit face."""
+    """Whether a symmetry g of the filled space, (4, 4), maps every fit face onto a fit face."""
     fit = [face for face in solid.faces.values() if face.fit]
     return all(any(_same_corners(pose.apply(g, face.outline), other.outline) for other in fit) for face in fit)
 
 
 def _same_corners(a: Array, b: Array) -> bool:
-    """Whether two outlines, (n, 3) and (m, 3), have the same corners, wherever they begin."""
+    """Whether two outlines, (n, 3) and (m, 3), have the same corners, at whichever corner they begin."""
     far = np.linalg.norm(a[:, None] - b[None], axis=-1)
     return bool(len(a) == len(b) and (far.min(axis=0) < _SAME_M).all() and (far.min(axis=1) < _SAME_M).all())
 
 
 def _cuts(values: Array) -> Array:
-    """Sorted, with one of those that are the same."""
+    """Sorted values without duplicates up to `_SAME_M`."""
     ordered = np.sort(values)
     return ordered[np.append(True, np.diff(ordered) > _SAME_M)]
 
 
 def _fill(boxes: list[tuple[Array, Array]], middles: list[Array]) -> NDArray[np.bool_]:
-    """Which cells, given by their middles along each axis, are in one of the boxes."""
+    """Which cells of a grid lie in one of the boxes, (x, y, z) booleans.
+
+    Args:
+        boxes: Centre and half sizes of each, (3,), [m].
+        middles: Centres of the cells along each of the three axes.
+    """
     filled = np.zeros([len(m) for m in middles], dtype=np.bool_)
     for at, half in boxes:
         inside = [np.abs(m - at[i]) < half[i] for i, m in enumerate(middles)]

@@ -1,4 +1,4 @@
-"""The exponential of SE(3) with its derivative, as matrix polynomials: few operations for many twists."""
+"""Exponential map of SE(3) and its right Jacobian for many twists at once, by matrix polynomials."""
 
 from math import factorial
 
@@ -9,8 +9,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.pose import hat
 
 _TERMS = 24
+"""Terms of the series in the squared angle: exact to rounding for up to two whole turns."""
 _SHORT = 9
-"""Terms of the series in the squared angle: for up to two turns, and for up to one radian, the rest is rounding."""
+"""The same for angles up to one radian."""
 
 
 def _generators() -> Array:
@@ -48,14 +49,19 @@ def _series() -> Array:
 GENERATORS = _generators()
 """A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
 _TO_MATRIX = np.ascontiguousarray(GENERATORS[:, :3].reshape(6, 12))
+"""The first three rows of the generators, flattened: a twist times this is X without its zero row, (6, 12)."""
 ADJOINTS = _adjoints()
 """The adjoint matrix of a twist xi is sum_i xi_i ADJOINTS[i], (6, 6, 6)."""
 _TO_ADJOINT = ADJOINTS.reshape(6, 36)
+"""The adjoints, flattened: a twist times this is its adjoint matrix, (6, 36)."""
 _COEFFICIENTS = _series()
+"""Series coefficients, (TERMS, 6), from `_series`."""
 _ONE4 = np.eye(4)
 _ONE6 = np.eye(6)
 _SUM = np.ones(3)
+"""Sums three components by a matrix product."""
 _POWERS = np.arange(float(_TERMS))
+"""Exponents of the squared angle."""
 
 
 def compute_exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
@@ -86,5 +92,5 @@ def compute_exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
 
 
 def compute_right_jacobian(twist: ArrayLike) -> Array:
-    """J_r alone, (*, 6) -> (*, 6, 6)."""
+    """The right Jacobian J_r of `compute_exp_and_jacobian` alone, (*, 6) -> (*, 6, 6)."""
     return compute_exp_and_jacobian(twist)[1]

@@ -1,1 +1,1 @@
-"""The judge: is the assembly right? Knows geometry, the assembly and what was reached, nothing else."""
+"""The judge: decides from geometry and the reached poses alone whether an assembly is right."""

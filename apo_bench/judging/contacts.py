@@ -1,4 +1,4 @@
-"""Measure the contacts of an assembly on the nominal faces at the poses that were reached."""
+"""Measure the contacts of an assembly, on nominal faces at the reached poses, and compare them with their limits."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -21,6 +21,7 @@ from apo_bench.geometry import Array, Mate, Overlap, compute_shares
 from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]
+# Kind of contact -> its gap in words.
 _OFF: dict[ContactKind, str] = {
     "plane on plane": "off by {:.2f} mm",
     "shaft in hole": "{:.2f} mm off the axis",
@@ -31,14 +32,14 @@ _OFF: dict[ContactKind, str] = {
 
 
 class Gaps(NamedTuple):
-    """How far two faces are apart and how deep in each other where they are most, [mm]; not negative."""
+    """The largest distance and the largest penetration of two faces, [mm]; not negative."""
 
     apart_mm: float
     deep_mm: float
 
 
 class ContactVerdict(NamedTuple):
-    """One contact at one moment."""
+    """The measurements and verdicts of one contact at one moment."""
 
     contact: Contact
     operation: int
@@ -46,18 +47,22 @@ class ContactVerdict(NamedTuple):
     moment: ContactMoment
     """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
     gap_mm: float | None
-    """Largest |e|: distance of a corner of the overlap to the plane of the other face; of round faces that of the
-    axes, at the ends of their common length (`Mate.gap_m`); None without any overlap. Where faces may be farther apart
-    than deep, |e| where it exceeds what is allowed the most."""
+    """Largest |e|; None without any overlap.
+
+    For flat faces, the distance of an overlap corner to the other plane. For round faces, the distance of the axes at
+    the ends of their common length (`Mate.gap_m`). If faces may be farther apart than deep, the |e| that exceeds its
+    limit the most.
+    """
     angle_deg: float
-    """Between the normals of the faces, or between the axes; 0 if they look straight at each other."""
+    """Between the axes, or between one normal and the opposite of the other; 0 for parallel faces."""
     overlap: float
-    """How much of the true overlap, or of the true common length, is covered."""
+    """Share of the true overlap, or of the true common length, that is covered, 0 to 1."""
     touching: bool
-    """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
+    """Gap within the strict limit and angle within the loose one; true for parallel faces without overlap."""
     covering: bool
-    """There is an overlap, and it is large enough."""
+    """The faces overlap, by the required share."""
     loose: bool
+    """Gap and angle within the loose limits, and `covering`."""
     allowed_mm: float
     """The largest gap that counts as touching."""
     kind: ContactKind = "plane on plane"
@@ -68,36 +73,43 @@ class ContactVerdict(NamedTuple):
 
 
 class ContactCase(NamedTuple):
-    """A contact to be judged at one moment."""
+    """A contact to judge at one moment."""
 
     contact: Contact
     operation: int
-    """That makes it, counted from 0."""
+    """The operation that makes the contact, counted from 0."""
     moment: ContactMoment
     poses: Poses
-    """Where the parts are, world frame, [m]."""
+    """The reached poses of the parts, world frame, [m]."""
     true: Poses
-    """Where they are when it is made, if all goals are the true ones."""
+    """The true poses of the parts when the contact is made."""
     anywhere: bool = False
-    """Whether the area of the overlap alone counts, wherever on the environment face it is."""
+    """Whether only the area of the overlap counts, not its position on the environment face."""
 
 
 class ContactJudge(NamedTuple):
-    """The limits of a contact, at any moment."""
+    """The limits by which contacts are judged, at any moment."""
 
     known: Meetings
-    """The contacts, with what is measured already."""
+    """Cache of measured contacts."""
     thresholds: Thresholds
     clearance_mm: float
 
     def verdicts(self, cases: Sequence[ContactCase]) -> tuple[ContactVerdict, ...]:
-        """Measure contacts, all in one call."""
+        """The verdicts on contacts, in the order of the cases, measured in one call."""
+        # Two measurements per case: reached (even indices), true (odd indices).
         found = self.known.measure((c.contact, poses) for c in cases for poses in (c.poses, c.true))
         common = [each.common if isinstance(each, Mate) else each for each in found]
         shares = compute_covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
         return tuple(self._verdict(*each) for each in zip(cases, found[::2], shares.tolist(), strict=True))
 
     def _verdict(self, case: ContactCase, lie: Meeting, covered: float) -> ContactVerdict:
+        """The verdict on one contact.
+
+        Args:
+            lie: The contact as measured at the reached poses.
+            covered: Share of the true overlap that is covered.
+        """
         limits = self.thresholds
         contact = case.contact
         gaps, angle = _measure(self.known.assembly, contact, case.poses, lie)
@@ -119,10 +131,10 @@ class ContactJudge(NamedTuple):
         )
 
     def _nearest_limit(self, case: ContactCase, gaps: Gaps | None) -> tuple[float, float | None]:
-        """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
+        """(limit, gap), [mm], of the side, apart or deep, that exceeds its limit more; gap None without an overlap."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
         deep = compute_deep_limit_mm(self.known.assembly, case.contact, *lengths)
-        # faces may be farther apart than deep, so the smaller gap of the two needs no other limit
+        # The limit for faces apart is never smaller than that for faces deep.
         if gaps is None or gaps.apart_mm <= gaps.deep_mm:
             return deep, None if gaps is None else gaps.deep_mm
         apart = compute_apart_limit_mm(self.known.assembly, case.contact, case.operation, case.true, *lengths)
@@ -130,9 +142,10 @@ class ContactJudge(NamedTuple):
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
-    """`gap` and `overlap`, each with what is wrong at the worst contact, if there is anything."""
+    """Pairs of fault code (`gap`, `overlap`) and sentence about the worst contact, for each fault that occurs."""
     apart = [c for c in contacts if not c.touching]
     if apart:
+        # An angle beyond its limit is worse than any gap.
         worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))
         if worst.gap_mm is None or worst.angle_deg > thresholds.loose_angle_deg:
             how = f"turned by {worst.angle_deg:.1f} deg, where {thresholds.loose_angle_deg:g} deg are allowed"
@@ -150,10 +163,10 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
 
 
 def compute_covered_shares(reached: Sequence[Overlap], true: Sequence[Overlap], anywhere: Sequence[bool]) -> Array:
-    """How much of each true overlap is covered by the one that was reached, (k,), 0 to 1; 1 where the true is empty.
+    """The share of each true overlap that the reached one covers, (k,), 0 to 1; 1 if the true overlap is empty.
 
     Args:
-        anywhere: Where the areas alone are compared, as in `ContactCase`.
+        anywhere: Per contact, whether only areas are compared, as in `ContactCase`.
     """
     area, whole = (np.array([overlap.area for overlap in of]) for of in (reached, true))
     out = np.minimum(1.0, np.divide(area, whole, out=np.ones(len(whole)), where=whole > 0.0))
@@ -167,9 +180,12 @@ def _when(verdict: ContactVerdict) -> str:
 
 
 def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Meeting) -> tuple[Gaps | None, float]:
-    """What is between the faces, and the angle between the normals or axes [degrees].
+    """The gaps of a contact (None without overlap), and the angle between normals or axes [degrees].
 
-    Round faces are off, not apart or deep.
+    The offset of round faces counts both as distance and as penetration.
+
+    Args:
+        lie: The contact as measured by `Meetings`.
     """
     if isinstance(lie, Mate):
         off = 1e3 * lie.gap_m
@@ -182,6 +198,7 @@ def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Meeting) -
     angle = math.degrees(math.acos(min(1.0, max(-1.0, float(-n @ T_e[:3, :3] @ normal)))))
     if not lie:
         return None, angle
-    # Seen from the manipulated face, a corner on the plane of the other one is in front of it where the two are apart.
+    # Signed distance of the overlap corners, which lie on the environment face, from the plane of the manipulated
+    # face: positive where the faces are apart.
     e = 1e3 * ((lie.corners - T_m[:3, 3]) @ n + plane[3])
     return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle

@@ -1,4 +1,4 @@
-"""Judge whether the assembly was made as demonstrated: every contact when it is made, and at the end."""
+"""Judge whether the assembly was made as demonstrated: every contact when it is made, and again at the end."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -13,17 +13,22 @@ from apo_bench.judging.judgement import Judgement, judgement
 def judge_demonstrated(
     judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
 ) -> Judgement:
-    """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
+    """Judge every contact when it is made and, if it is not broken later, at the end; and every snapshot.
 
-    At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
-    `support_mm` for the others; the overlap is at least a part of the true one, at its place on the environment face,
-    so an assembly that is right in itself but stands elsewhere on the table is not what was shown; no two geoms are
-    too deep in each other; nothing holds a part; nothing moves; no centre of a part that was in place is pushed before
-    it is moved again, and at the end no corner, but of fixtures.
+    Conditions:
+
+    - |e| at the corners of the overlap is at most the clearance plus a margin (fit contacts) or `support_mm` (others);
+    - the overlap covers the required share of the true one, at its place on the environment face. An assembly that is
+    right
+      in itself but stands elsewhere on the table is therefore not as demonstrated;
+    - no two geoms penetrate too deep, nothing holds a part, and nothing moves;
+    - no centroid of a placed part is pushed before its next operation, and at the end no corner; fixtures are exempt at
+    the
+      end.
 
     Args:
-        reached: Sound snapshots.
-        reference: (n, 4, 4), the true goals, world frame, [m].
+        reached: Snapshots with finite poses.
+        reference: (n, 4, 4), the true target poses, world frame, [m].
         displaced: From `displacements`, [m].
     """
     assembly = judge.known.assembly
@@ -42,14 +47,14 @@ def judge_demonstrated(
 def _contacts_when_made(
     judge: ContactJudge, after: Sequence[Snapshot | None], final: Snapshot | None, reference: Array
 ) -> tuple[ContactVerdict, ...]:
-    """Every contact in the snapshot after its operation, and at the end if it still stands.
+    """The verdict on every contact in the snapshot after its operation, and at the end if it is not broken.
 
-    Moments of which there is no snapshot are left out.
+    Moments without a snapshot are left out.
     """
     first = next((snapshot for snapshot in (*after, final) if snapshot is not None), None)
     if first is None:
         return ()
-    # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
+    # The true pose of a part that was not moved yet, such as a fixed one, is that in the first snapshot.
     true = compute_placements(judge.known.assembly, first.poses, reference)
     cases = []
     for contact, made, lost in judge.known.assembly.relations():
@@ -63,12 +68,12 @@ def _contacts_when_made(
 def _pushes(
     assembly: Assembly, after: Sequence[Snapshot | None], final: Snapshot | None
 ) -> Iterator[tuple[str, float]]:
-    """How far the centroid of each part lies, at each later moment, from where its last operation had put it, [m]."""
-    put: dict[str, Array] = {}
+    """Part and distance of its centroid, at each later moment, from where its last operation put it, [m]."""
+    put: dict[str, Array] = {}  # part -> its centroid after its last operation
     for k, snapshot in enumerate((*after, final)):
         moved = assembly.operations[k].moves if k < len(assembly) else ()
         for part in moved:
-            put.pop(part, None)
+            put.pop(part, None)  # a part that moves now starts anew
         if snapshot is not None:
             centroids = {part: assembly.solids[part].centroid[None] for part in (*put, *moved)}
             at = {part: pose.apply(snapshot.poses[part], c)[0] for part, c in centroids.items()}

@@ -1,4 +1,4 @@
-"""How far parts moved after they were put: in the room, against each other, and where fixed parts say where to."""
+"""Measure how far parts moved after they were placed: in the world, against each other, and against fixed parts."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
@@ -17,11 +17,14 @@ from apo_bench.assembly import (
 from apo_bench.geometry import Array, Solid, find_least_turned, pose
 
 _ONE_WAY = 0.999
-"""Cosine between the normals of faces that look the same way: together they are a plain support."""
+"""Faces whose normals have at least this cosine are parallel: together they are a plain support."""
 _HELD = 1e-3
-"""A motion of all corners by 1 m is held by contacts that it would open by more, [m]."""
+"""Contacts constrain a motion of all corners by 1 m if it would open them by more than this, [m]."""
 _PASSES = 4
-"""Turns of two parts of revolution are undone in turn; one pass is exact where their axes are parallel or square."""
+"""Passes in which the rotations of two parts of revolution are removed alternately.
+
+One pass is exact for parallel or perpendicular axes.
+"""
 
 
 def last_moves(assembly: Assembly) -> dict[str, int]:
@@ -30,12 +33,12 @@ def last_moves(assembly: Assembly) -> dict[str, int]:
 
 
 def displacements(assembly: Assembly, reached: ReachedState, away: Collection[str]) -> dict[str, float]:
-    """How far a corner of each part lies at most at the end from where it was after the part's last operation, [m].
+    """The largest displacement of a corner of each part between its last operation and the end, [m].
 
-    A part of revolution may have turned about its axis.
+    The rotation of a part of revolution about its axis does not count.
 
     Args:
-        away: Parts that do not count.
+        away: Parts that do not count (fixtures).
     """
     moved = dict[str, float]()
     if reached.final is None:
@@ -59,19 +62,23 @@ def faults_of_place(
     seen: Poses,
     allowed_mm: float,
 ) -> Iterator[tuple[str, float]]:
-    """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
+    """Displacements that spoil the finished assembly: the two parts in words, and how far a corner moved, [m].
 
-    Two movable parts that touch at the end: against each other, along what their contacts leave free, since the later
-    of their last operations; but no farther than one of them moved in the room since its own. A part whose contacts
-    with fixed parts are more than a plain support (a pocket, a hole, a groove, a wall beside the floor): against
-    these, as they say where it belongs. A whole on a plain support may stand anywhere.
+    - Two movable parts in contact at the end: their relative motion along free directions, since the later of their
+    last
+      operations. At most the displacement of one of them in the world counts.
+    - A part and fixed parts that locate it by more than a plain support (pocket, hole, groove, wall beside the floor):
+    the
+      displacement of the part in the world. A whole assembly on a plain support may stand anywhere.
 
     Args:
-        known: The contacts, with what is measured already.
+        known: Cache of measured contacts.
+        after: Snapshots after each operation.
+        final: The snapshot at the end.
         displaced: From `displacements`, [m].
-        away: Parts that do not count.
-        seen: The final poses, each part turned by the symmetry by which its contacts are judged.
-        allowed_mm: Parts are passed over that moved no farther in the room.
+        away: Parts that do not count (fixtures).
+        seen: The final poses, each part rotated by the symmetry by which its contacts are judged.
+        allowed_mm: Parts that moved no farther in the world are skipped.
     """
     assembly = known.assembly
     last = last_moves(assembly)
@@ -92,28 +99,26 @@ def faults_of_place(
 
 
 def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str], list[Contact]]:
-    """The contacts that stand at the end, by the two parts that touch; all fixed parts count as one, the first."""
+    """The contacts closed at the end, by the pair of parts; all fixed parts count as one, the first by name."""
     standing = dict[tuple[str, str], list[Contact]]()
     ground = min(assembly.fixed, default="")
     for contact, _, lost in assembly.relations():
         m, e = (ground if end.part in assembly.fixed else end.part for end in contact)
         if lost is None and not {m, e} & set(away):
+            # The fixed part comes first; of two movable parts either order is one pair.
             pair = (m, e) if m == ground or (m, e) in standing else (e, m)
             standing.setdefault(pair, []).append(contact)
     return standing
 
 
 def _is_mate(assembly: Assembly, contacts: Sequence[Contact], part: str, seen: Poses) -> bool:
-    """Whether contacts with fixed parts hold a part in more than one direction."""
+    """Whether the contacts of a part with fixed parts have different normals, so that they locate it."""
     normals = np.array([touched.normal for touched in find_touched_contacts(assembly, contacts, [part], seen)])
     return len(normals) > 0 and float((normals @ normals[0]).min()) < _ONE_WAY
 
 
 def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, held: Array) -> float:
-    """How far a corner of either of two parts moved against the other one, along what contacts leave free, [m].
-
-    The motion is a twist; what contacts hold is taken out of it where this moves the corners of both parts the least.
-    """
+    """The largest relative motion of a corner of two parts along directions that their contacts leave free, [m]."""
     a, b = (assembly.solids[part] for part in parts)
     before, now = (pose.inverse(poses[parts[0]]) @ poses[parts[1]] for poses in (put, final))
     # The motion of b in the frame of a, as a twist of that frame: now = exp(twist) before.
@@ -123,7 +128,7 @@ def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, 
 
 
 def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
-    """The pose of b in the frame of a, as it looks, with parts of revolution turned about their axes the least."""
+    """The pose `now` of b in the frame of a, with rotations about axes of revolution made nearest to `before`."""
     for _ in range(_PASSES):
         now = find_least_turned(b, now, before)
         now = pose.inverse(find_least_turned(a, pose.inverse(now), pose.inverse(before)))
@@ -131,10 +136,10 @@ def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
 
 
 def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], T: Array, seen: Poses) -> Array:
-    """By how much twists (v, w) of the second part open contacts with the first one: rows of n (v + w x p), (k, 6).
+    """Rows of n (v + w x p), (k, 6): how much a twist (v, w) of the second part opens each contact with the first one.
 
     Args:
-        T: The pose of the first part, in whose frame the twists are.
+        T: World pose of the first part, in whose frame the twists are.
     """
     points, normals = find_touch_points(
         known.assembly, find_touched_contacts(known.assembly, contacts, [parts[1]], seen), seen, known
@@ -145,7 +150,7 @@ def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], 
 
 
 def _free(twist: Array, held: Array, at: Array) -> Array:
-    """What is left of a twist, (6,), if rows hold some of it: the free motion that is nearest to it at points, (k, 3).
+    """The free twist, (6,), nearest to `twist` by the motion of the points `at`, (k, 3); `held` has the constraints.
 
     With K the motion of the points by a twist and K^T K = L L^T, distances are those of L^T twist.
     """
@@ -156,10 +161,12 @@ def _free(twist: Array, held: Array, at: Array) -> Array:
     # R of rows = Q R has their singular values and right vectors, and at most six rows.
     _, sizes, ways = np.linalg.svd(np.linalg.qr(np.linalg.solve(L, held.T).T, mode="r"), full_matrices=True)
     loose = ways[int((sizes > _HELD).sum()) :]
+    # Projection onto the rows without singular value, in y, then back to a twist.
     return np.asarray(np.linalg.solve(L.T, loose.T @ (loose @ (L.T @ twist))))
 
 
 def _farthest(moved: Array) -> float:
+    """The largest length of displacements, (k, 3)."""
     return float(np.linalg.norm(moved, axis=1).max())
 
 

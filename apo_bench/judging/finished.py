@@ -1,4 +1,4 @@
-"""Judge the finished assembly: what a person says who sees the end, whatever became of it on the way."""
+"""Judge the finished assembly by its final state alone, whatever happened during the assembly."""
 
 from collections.abc import Iterator, Mapping
 
@@ -23,18 +23,17 @@ from apo_bench.judging.judgement import Judgement, judgement
 def judge_finished(
     judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
 ) -> Judgement:
-    """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
+    """Judge the final state: contacts, penetration, nothing held, nothing moving, and no part displaced after placing.
 
-    The contacts that stand at the end are needed. A part may have been put in by any of its symmetries: the one
-    nearest in rotation to its true final pose counts, for all its contacts. On a fixed part the area of the overlap
-    counts, wherever it is, so that an assembly that is right in itself may stand elsewhere on the table; between
-    movable parts the overlap has its place on the environment face. Where fixtures end is free. Parts that touch at the
-    end have moved against each other by `pushed_mm` at most since they were put, at any corner and along what their
-    contacts leave free; so has a part in a mate of a fixed part. Every operation must have ended.
+    Only contacts that exist at the end are required. For each part, its symmetry nearest in rotation to the true final
+    pose counts, for all of its contacts. With a fixed part only the area of the overlap counts, so an assembly that is
+    right in itself may stand elsewhere on the table. Between movable parts the overlap has its place on the environment
+    face. Fixtures may end anywhere. Displacements by `faults_of_place` are at most `placed_part_shift_mm`. Every
+    operation must have ended.
 
     Args:
-        reached: Sound snapshots.
-        reference: (n, 4, 4), the true goals, world frame, [m].
+        reached: Snapshots with finite poses.
+        reference: (n, 4, 4), the true target poses, world frame, [m].
         displaced: From `displacements`, [m].
     """
     assembly = judge.known.assembly
@@ -59,16 +58,18 @@ def judge_finished(
 
 @remember
 def fixtures(assembly: Assembly) -> frozenset[str]:
-    """The parts that were used and put away.
+    """The fixtures of an assembly: parts that were used and then put away.
 
-    The last operation of such a part breaks its last contacts with movable parts and makes contacts with fixed parts
-    only. One that ends against a movable part is none, even if that part leaves it later.
+    The last operation of a fixture breaks its last contacts with movable parts and makes contacts with fixed parts
+    only. A part that ends against a movable part is no fixture, even if that part leaves later.
     """
     relations = assembly.relations()
     return frozenset(part for part, k in last_moves(assembly).items() if _put_away(assembly, relations, part, k))
 
 
 def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
+    """Whether operation k, the last of a part, puts that part away."""
+    # contacts of the part
     mine = [relation for relation in relations if part in {end.part for end in relation.contact}]
     movable = [relation for relation in mine if not _on_fixed(assembly, relation.contact)]
     breaks = any(relation.lost == k for relation in movable)
@@ -77,24 +78,29 @@ def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k:
 
 
 def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
+    """Whether a contact is with a fixed part."""
     return any(end.part in assembly.fixed for end in contact)
 
 
 def _standing(assembly: Assembly, away: frozenset[str]) -> Iterator[tuple[Contact, int, bool]]:
-    """Contacts that stand at the end, of parts that are no fixtures; what made them, whether they may be anywhere."""
+    """The contacts that are required at the end, without those of fixtures.
+
+    Yields (contact, operation that made it, whether its position on the environment face is free).
+    """
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
             yield contact, made, _on_fixed(assembly, contact)
 
 
 def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array:
-    """The least share of the true overlap that a finished assembly covers, for each of several truths, (d,).
+    """The least covered share of a true overlap in a finished assembly, for each of d possible truths, (d,).
 
     Args:
-        references: (d, n, 4, 4), goals that may be the true ones, world frame, [m].
+        final: Poses of all parts in the finished assembly.
+        references: (d, n, 4, 4), possible true target poses, world frame, [m].
 
     Returns:
-        Not a number where faces that should touch do not meet in the truth itself, so that it cannot be one.
+        Not a number if required faces do not meet in the truth itself, which is then impossible.
     """
     contacts = [(contact, anywhere) for contact, _, anywhere in _standing(assembly, fixtures(assembly))]
     true = compute_placements(assembly, final, references.swapaxes(0, 1))[-1]
@@ -110,7 +116,7 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
 
 
 def _as_meant(assembly: Assembly, poses: Poses, true: Poses) -> Poses:
-    """Poses of parts turned by that of their symmetries which is nearest to the truth, or to each of several truths."""
+    """Poses with each part rotated by its symmetry that is nearest to the truth, or to each of several truths."""
     return {
         part: T if part in assembly.fixed else find_nearest_alike(assembly.solids[part], T, true[part])
         for part, T in poses.items()

@@ -1,4 +1,4 @@
-"""What one rule of judging finds: the faults, and every number they rest on."""
+"""The result of one rule of judging: its faults, and the numbers behind them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from apo_bench.judging.contacts import ContactVerdict, faults_in_words
 from apo_bench.records import Thresholds
 
 FAULTS = ("not_made", "gap", "overlap", "penetration", "pushed", "not_released", "not_at_rest")
-"""What the judge can find, in the order in which it names one."""
+"""Codes of faults, by precedence: the first that occurs is named."""
 
 
 @final
@@ -23,11 +23,11 @@ class Judgement:
     """The faults of an assembly by one rule."""
 
     loose: bool
-    """Every operation ended, and every needed contact is there within millimetres and degrees."""
+    """Every operation ended, and every required contact holds within the loose limits."""
     conditions: Mapping[str, bool]
-    """Each of `FAULTS`, in that order: whether it was found."""
+    """Each of `FAULTS`, in that order -> whether it occurs."""
     why: str
-    """What is wrong by the first fault: which contact and how many mm, say; empty where nothing is."""
+    """The first fault in words, such as the contact and its gap; empty without details."""
     contacts: tuple[ContactVerdict, ...]
     gap_mm: float | None
     """Worst |e| of all contacts; None if none could be measured, as for the numbers below."""
@@ -35,13 +35,15 @@ class Judgement:
     overlap: float | None
     penetration_mm: float | None
     placed_part_shift_mm: float | None
-    """How far a part that was in place was moved in the room at most, whether or not this rule minds. The finished
-    assembly is judged by other lengths: how far movable parts slid on each other, and this one of parts in a mate of a
-    fixed part."""
+    """Largest displacement of a placed part in the world, even if this rule does not limit it.
+
+    The rule for the finished assembly limits other lengths: relative motion of movable parts, and this displacement for
+    parts that fixed parts locate.
+    """
 
     @property
     def holds(self) -> bool:
-        """Not one fault."""
+        """Whether there is no fault."""
         return self.loose and not any(self.conditions.values())
 
     @property
@@ -59,15 +61,16 @@ def judgement(
     all_made: bool,
     disturbed: Sequence[float] | None = None,
 ) -> Judgement:
-    """Compare what was measured with the thresholds.
+    """Compare measurements with the thresholds.
 
     Args:
-        contacts: The contacts that the rule needs.
-        states: The snapshots in which nothing may be inside anything, held or moving.
-        pushes: Part, and how far it was pushed [mm], by what the rule minds.
+        contacts: The contacts that the rule requires.
+        states: The snapshots in which nothing may penetrate, be held or move.
+        pushes: Part and its displacement [mm], as the rule limits it.
         all_made: Whether every operation ended and there is a snapshot of the end.
-        disturbed: How far parts were pushed [mm], if that is not the same.
+        disturbed: Displacements of parts in the world [mm], if `pushes` are other lengths.
     """
+    # `not x <= limit` also fails a value that is not a number.
     conditions = {
         "not_made": not all_made,
         "gap": any(not c.touching for c in contacts),
@@ -98,6 +101,7 @@ def _why(
     pushes: Sequence[tuple[str, float]],
     thresholds: Thresholds,
 ) -> str:
+    """The fault in words; empty for faults without details."""
     if fault in ("gap", "overlap"):
         return dict(faults_in_words(contacts, thresholds))[fault]
     if fault == "penetration":
@@ -110,5 +114,6 @@ def _why(
 
 
 def _rests(snapshot: Snapshot, thresholds: Thresholds) -> bool:
+    """Whether the parts of a snapshot are at rest."""
     slow = snapshot.speed_m_s * 1e3 < thresholds.rest_mm_s
     return slow and np.degrees(snapshot.spin_rad_s) < thresholds.rest_deg_s

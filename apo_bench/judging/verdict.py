@@ -1,4 +1,4 @@
-"""Is the assembly right? A pure function of what was reached; it knows no plan, no corrector and no residual."""
+"""Judge the reached state of an assembly; a pure function that knows no plan, no corrector and no residual."""
 
 from dataclasses import dataclass
 from typing import final

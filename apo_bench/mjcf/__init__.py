@@ -1,4 +1,4 @@
-"""Files in MuJoCo's own format, read by MuJoCo, as plain data."""
+"""Read files in MuJoCo's format, by MuJoCo, as plain data."""
 
 from apo_bench.mjcf.lazy_graphics import import_mujoco
 

@@ -1,8 +1,8 @@
-"""Import MuJoCo without a graphics driver, which the first picture loads.
+"""Import MuJoCo without a graphics driver; the first picture loads the driver.
 
-MuJoCo chooses its OpenGL backend by the variable MUJOCO_GL while it is imported, and a driver that is loaded then stays
-in the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. If MuJoCo
-was imported before, it stays as it is.
+MuJoCo chooses its OpenGL backend by the variable MUJOCO_GL during its import. A driver loaded then stays in the
+process, and the LLVM of Mesa's driver crashes other packages (Triton, so PyTorch with CUDA). If MuJoCo was imported
+before, nothing changes.
 """
 
 import importlib
@@ -18,7 +18,7 @@ _NO_BACKEND = {_VARIABLE: "disable"}
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo; `mujoco.GLContext` is there at its first use."""
+    """Import MuJoCo without a backend; `mujoco.GLContext` is loaded at its first use."""
     if "mujoco" in sys.modules:
         return
     with set_environment(_NO_BACKEND):
@@ -29,11 +29,12 @@ def import_mujoco() -> None:
 
 
 def _choose_later(module: ModuleType, source: ModuleType) -> None:
-    """Take the context out of a module; its first use runs `source` again, under the variable as it is then."""
+    """Remove `GLContext` from a module; its first use reloads `source` under the value of MUJOCO_GL at that time."""
     wanted = "GLContext"
     vars(module).pop(wanted, None)
 
     def chosen(name: str) -> Any:
+        """The module's `__getattr__` for missing attributes (PEP 562)."""
         if name != wanted:
             raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")
         if name not in vars(source):

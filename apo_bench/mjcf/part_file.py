@@ -1,4 +1,4 @@
-"""A part file as plain data: one body of named boxes, cylinders and meshes, whose sites name faces."""
+"""Read a part file as plain data: one body of named boxes, cylinders and meshes, whose sites mark faces."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io import read_text
 
-_LARGEST_BYTES = 4_000_000
-_LONGEST_REASON = 200
+_LARGEST_BYTES = 4_000_000  # size of a part file
+_LONGEST_REASON = 200  # characters of MuJoCo's reason in an error message
 _MUST_BE_EMPTY = (
     *("joints", "tendons", "actuators", "sensors", "equalities", "pairs", "excludes", "keys", "plugins"),
     *("cameras", "lights", "flexes", "skins", "hfields", "textures", "materials"),
 )
-"""What moves, acts or senses: the scene has these."""
+"""Elements that a part file must not have: the scene adds them."""
 _KINDS: Mapping[Any, Literal["box", "cylinder", "mesh"]] = {
     mujoco.mjtGeom.mjGEOM_BOX: "box",
     mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
@@ -30,7 +30,7 @@ _KINDS: Mapping[Any, Literal["box", "cylinder", "mesh"]] = {
 @final
 @dataclass(frozen=True, eq=False)
 class PartGeom:
-    """A piece of a part as the file states it, frame of the part, [m]."""
+    """A convex piece of a part as the file states it, part frame, [m]."""
 
     name: str
     kind: Literal["box", "cylinder", "mesh"]
@@ -39,20 +39,20 @@ class PartGeom:
     size: Array
     """(3,): half sizes of a box; radius, half length and 0 of a cylinder."""
     axis: Array
-    """(3,): of a cylinder, of any length."""
+    """(3,): axis of a cylinder, not normalised."""
     corners: Array
-    """(k, 3), of a mesh, to the last digit of the file."""
+    """(k, 3): vertices of a mesh, in double precision."""
     density: float
     """[kg/m^3]."""
     friction: tuple[float, float, float]
-    """Sliding, turning and rolling."""
+    """Coefficients of sliding, torsional and rolling friction."""
     rgba: tuple[float, float, float, float]
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PartSite:
-    """A point on a face."""
+    """A point on a face, which gives the face its name."""
 
     name: str
     pos: Array
@@ -62,13 +62,13 @@ class PartSite:
     group: int
     rgba: tuple[float, float, float, float]
     default: str
-    """Name of its class of defaults; `main` if it has none."""
+    """Name of the default class of the site; `main` if none is stated."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PartPicture:
-    """How a part looks: a mesh that never collides."""
+    """The appearance of a part: a mesh that never collides."""
 
     name: str
     file: Path
@@ -78,7 +78,7 @@ class PartPicture:
 @final
 @dataclass(frozen=True, eq=False)
 class PartModel:
-    """What a part file says."""
+    """The content of a part file."""
 
     body: str
     geoms: tuple[PartGeom, ...]
@@ -90,7 +90,7 @@ def read_part_model(path: Path) -> PartModel:
     """Read a part file.
 
     Raises:
-        InputError: MuJoCo cannot read it, or it has what no part has.
+        InputError: MuJoCo cannot read the file, or it has an element that parts must not have.
     """
     text = read_text(path, "part file", _LARGEST_BYTES)
     require("<include" not in text, f"{path}: <include> is given, which a part has not; write all into the file.")
@@ -100,6 +100,7 @@ def read_part_model(path: Path) -> PartModel:
     except (ValueError, ElementTree.ParseError) as error:
         raise InputError(f"{path}: MuJoCo cannot read this part file: {_reason(error)}.") from error
     body = _only_body(spec, path)
+    # Geoms that never collide are pictures, all others are pieces.
     shown = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
     require(len(shown) <= 1, f"{path}: {len(shown)} geoms never collide; a part has one picture at most.")
     pieces = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
@@ -119,7 +120,7 @@ def read_part_model(path: Path) -> PartModel:
 
 
 def _corners(text: str) -> dict[str, Array]:
-    """Mesh -> its corners, (k, 3): MuJoCo keeps them in single precision."""
+    """Mesh -> its vertices, (k, 3), from the text, since MuJoCo keeps them in single precision."""
     meshes = [mesh for mesh in ElementTree.fromstring(text).iter("mesh") if "vertex" in mesh.attrib]
     return {
         mesh.get("name", ""): np.array([float(x) for x in mesh.attrib["vertex"].split()]).reshape(-1, 3)
@@ -128,11 +129,11 @@ def _corners(text: str) -> dict[str, Array]:
 
 
 def _only_body(spec: Any, path: Path) -> Any:
-    """The one body of a part, at rest where its frame is."""
+    """The single body of a part file, whose frame is the part frame."""
     for plural in _MUST_BE_EMPTY:
         require(not len(getattr(spec, plural)), f"{path}: the part has {plural}, which a part has not; remove them.")
     require(
-        len(spec.bodies) == 2 and not spec.worldbody.geoms and not spec.worldbody.sites,
+        len(spec.bodies) == 2 and not spec.worldbody.geoms and not spec.worldbody.sites,  # the world and the part
         f"{path}: a part is one <body> in <worldbody>, with all of its geoms and sites.",
     )
     body = spec.bodies[1]
@@ -145,6 +146,7 @@ def _only_body(spec: Any, path: Path) -> Any:
 
 
 def _geom(geom: Any, corners: Mapping[str, Array], path: Path) -> PartGeom:
+    """Convert a geom of a part file to a `PartGeom`, which has no rotation apart from the axis of a cylinder."""
     kind = _KINDS.get(geom.type)
     if kind is None:
         raise InputError(f'{path}: geom "{geom.name}" has another type than box, cylinder or mesh.')
@@ -176,6 +178,7 @@ def _geom(geom: Any, corners: Mapping[str, Array], path: Path) -> PartGeom:
 
 
 def _site(site: Any) -> PartSite:
+    """Convert a site of a part file to a `PartSite`."""
     return PartSite(
         name=site.name,
         pos=np.array(site.pos),
@@ -187,7 +190,7 @@ def _site(site: Any) -> PartSite:
 
 
 def _picture(spec: Any, geom: Any, path: Path) -> PartPicture:
-    """The picture of a part, once MuJoCo has compiled it."""
+    """The picture of a part; MuJoCo compiles it once to check the file."""
     file = spec.mesh(geom.meshname).file if geom.meshname else ""
     require(
         file and Path(file).name == file,
@@ -204,7 +207,8 @@ def _picture(spec: Any, geom: Any, path: Path) -> PartPicture:
 
 
 def add_picture(spec: Any, body: Any, picture: PartPicture) -> None:
-    """Give a body the picture of a part; it has no mass and never collides."""
+    """Add the picture of a part to a body as a geom without mass and collisions."""
+    # A picture need not enclose a volume, so its inertia is that of its surface.
     shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     spec.add_mesh(name=picture.name, file=str(picture.file.absolute()), inertia=shell)
     body.add_geom(
@@ -224,5 +228,5 @@ def _numbers(values: Iterable[float]) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """What the reader says, in one line."""
+    """The message of MuJoCo or of the XML parser in one line."""
     return one_line(" ".join(str(error).split()).rstrip("."), _LONGEST_REASON)

@@ -155,11 +155,11 @@ class TrialRecord(_Columns, total=False):
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
-    consistency_passes: bool | None
+    consistent: bool | None
     """Whether that test finds contacts and observed poses consistent."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
-    dropped: list[Name] | None
+    dropped_contacts: list[Name] | None
     """Contacts that the corrector left out."""
     rejected_observations: list[_Operation] | None
     """Operations whose pose was inferred, since they were not observed or the corrector rejected the observation."""

@@ -1,10 +1,14 @@
-"""Scenes, hands, the arm, replays and pictures, by MuJoCo and mink.
+"""Simulate demonstrations and replays with MuJoCo and mink: scenes, human hands, the arm, pictures.
 
-How a plan is carried out, to be read in this order: `execution/controller.py` (`replay`, one step of the schedule after
-the other), `execution/prepare.py` (a step becomes a `Transfer`: grips, lines, guards), `execution/carry_out.py` (one
-operation, as motions of the tip; gripping and letting go are in `execution/fingers.py`, pressing into a hole and
-searching for it in `execution/search.py`), `robot/robot.py` (a line of the tip becomes joint targets: `follow` calls
-`_run`, that `_tick`, and there is `mj_step`, once for each target; a search steps in `servo_step`).
+The execution of a plan, in the order of reading:
+
+- `execution/controller.py`: `replay`, the steps of the schedule one after the other.
+- `execution/prepare.py`: a step becomes a `Transfer` (grips, lines, guards).
+- `execution/carry_out.py`: one operation as motions of the tip. `execution/fingers.py` grips and releases,
+  `execution/search.py` presses into a hole and searches for it.
+- `robot/robot.py`: a line of the tip becomes joint targets. `follow` calls `_run`, that `_tick`, which calls `mj_step`
+  for each target; a search steps in `servo_step`.
+
 Hands that demonstrate: `human/demonstration.py`, `human/hands.py`.
 """
 

@@ -1,4 +1,4 @@
-"""Poses as MuJoCo has them: rotation matrices of nine numbers, quaternions with w first."""
+"""Convert between MuJoCo's rotations (nine numbers, or quaternions with w first) and poses, (4, 4)."""
 
 from typing import Any
 
@@ -25,12 +25,12 @@ def rotation(quaternion: Any) -> Array:
 
 
 def quaternion(T: Array) -> Array:
-    """How a pose, (4, 4), or a rotation, (3, 3), is turned, as a quaternion, w first."""
+    """The rotation of a pose, (4, 4), or of a rotation matrix, (3, 3), as a quaternion, w first."""
     q = np.zeros(4)
     mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
     return q
 
 
 def body_frame(data: Any, body: int) -> Array:
-    """Where a body is in the world, (4, 4)."""
+    """The world pose of a body, (4, 4)."""
     return frame(data.xmat[body], data.xpos[body])

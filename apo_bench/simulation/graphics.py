@@ -1,4 +1,4 @@
-"""Open MuJoCo's renderer or window, or name what is missing."""
+"""Open MuJoCo's renderer or window, or raise an error that names the missing package or display."""
 
 import importlib
 import os
@@ -10,19 +10,19 @@ from apo_bench.io import SAFE_PATH, set_environment
 
 _VARIABLE = "MUJOCO_GL"
 _CHILDREN = {SAFE_PATH: "1"}
-"""While GLFW is imported, which starts a Python process."""
+"""Environment while GLFW is imported, since that starts a Python process."""
 _SHADOW_TEXELS = 4096
-"""Texels of the shadow map along a side: 0.4 mm on the table each."""
+"""Texels of the shadow map along a side; each covers 0.4 mm on the table."""
 _SHADOW_REACH = 0.5
-"""Half width of the shadow map over the size of the scene."""
+"""Half width of the shadow map, relative to the size of the scene."""
 
 
 @set_environment(_CHILDREN)
 def renderer(model: Any, width: int, height: int) -> Any:
-    """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
+    """MuJoCo's renderer; on Linux without a display it uses EGL, unless MUJOCO_GL is set.
 
     Raises:
-        InputError: There is nothing to draw with, or the picture is too large.
+        InputError: No graphics driver can be used, or the picture is too large.
     """
     most = model.vis.global_.offwidth, model.vis.global_.offheight
     require(
@@ -55,7 +55,7 @@ def renderer(model: Any, width: int, height: int) -> Any:
 
 @set_environment(_CHILDREN)
 def need_window() -> None:
-    """Refuse a window for which MuJoCo's viewer would end the process.
+    """Raise an error instead of opening a window for which MuJoCo's viewer would end the process.
 
     Raises:
         InputError: There is no display.
@@ -69,11 +69,12 @@ def need_window() -> None:
 
 
 def _has_no_display() -> bool:
-    """Whether no window can be opened: a Linux machine whose variables name no display."""
+    """Whether this is a Linux machine whose variables name no display."""
     return sys.platform.startswith("linux") and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
 def _reason(error: Exception) -> str:
+    """The cause of a graphics error in one line."""
     if isinstance(error, AttributeError) and "NoneType" in str(error):
         return "its library is not installed"
     cause = error.__cause__ or error  # MuJoCo 4 says around it what to install, and repeats the variable

@@ -1,4 +1,4 @@
-"""Hooks that a demonstration or a replay calls."""
+"""Hooks: callbacks during a demonstration or a replay, and the phase that they are told."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,53 +7,54 @@ from typing import Any, NamedTuple, final
 from apo_bench.assembly import Plan, Step
 
 TICK_S = 0.02
-"""How often the robot checks its state and a film takes a picture."""
+"""Period in which the robot checks its state and a film takes a picture."""
 BY_HAND = "by hand"
+"""`Phase.macro` of a demonstration."""
 TOUCHING = "touch"
-"""Phases with an empty hand: a demonstration, and a robot that probes before it picks anything."""
+"""`Phase.macro` of a robot that probes with an empty hand before it picks anything."""
 
 
 class Phase(NamedTuple):
-    """What hands or robot do at one moment."""
+    """The activity of the hands or the robot at one moment."""
 
     operation: int | None
-    """From 0; None before the first begins."""
+    """Counted from 0; None before the first begins."""
     macro: str
-    """The macros of the motion, or the stage where it is none: `pick`, `carry`, `insert-into, move-to-bottom`; of a
-    demonstration `by hand`."""
+    """The macros of the motion, such as `insert-into, move-to-bottom`; else its stage, such as `pick`, `carry`;
+    `by hand` in a demonstration."""
     force_n: float
-    """On what is in the hand, [N], as the sensor at the wrist shows it; 0 with an empty hand, and of a human."""
+    """Contact force on the held part, [N], from the wrist sensor; 0 with an empty hand and in a demonstration."""
     undoes: bool = False
-    """Whether the operation is undone, to be done again later."""
+    """Whether the operation is undone, to be repeated later."""
 
 
 def _nothing(_: Any) -> None:
-    """The hook by default."""
+    """The default hook."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Hooks:
-    """Functions that are called while something is done."""
+    """Functions that are called during a demonstration or a replay."""
 
     before_replay: Callable[[Plan], None] = _nothing
-    """With the plan, also with one that is refused before anything moves; no human has one."""
+    """Called with the plan, also if it is refused before any motion; not in a demonstration."""
     before_step: Callable[[Step], None] = _nothing
-    """Before an operation is done or undone."""
+    """Called before an operation is done or undone."""
     after_step: Callable[[Step], None] = _nothing
-    """After it, when everything rests; not of one that fails."""
+    """Called after an operation, once everything rests; not if it fails."""
     after_tick: Callable[[Any, Phase], None] | None = None
-    """With the `MjData`, every tick of simulated time; of a demonstration also at its start. None: states between steps
-    are not worked out for it."""
+    """Called with the `MjData` every tick of simulated time, in a demonstration also at its start. None: states in
+    skipped stretches of a simulation are not reconstructed."""
     tick_s: float = TICK_S
-    """How long a tick of a demonstration is; a robot's is `TICK_S`."""
+    """Length of a tick of a demonstration; a robot always uses `TICK_S`."""
 
 
 def as_hooks(watch: Hooks | Callable[[Any], None] | None) -> Hooks:
-    """What is passed as `watch` as hooks: a function of the `MjData` is called after every tick.
+    """The argument `watch` as hooks: a function is called with the `MjData` after every tick.
 
     Args:
-        watch: A function may say by an attribute `period_s` how long a tick of a demonstration is.
+        watch: Hooks, a function, or None. An attribute `period_s` of a function is the tick of a demonstration, [s].
     """
     if isinstance(watch, Hooks):
         return watch

@@ -1,8 +1,8 @@
-"""Physics settings, each with the reason it has the value it has.
+"""Physics settings of all simulations, with the reason for each value.
 
-The time step and the stiffness of a contact decide verdicts at the border of the clearance, so they belong together:
-a contact's time constant of four steps, damping ratio 2. With a ratio of 1 a stick rocks in its slot for ever at 1 to
-5 mm/s in some perfect assemblies, with 1.5 still in 3 of 100; with a time constant of two steps a misaligned stick
+Time step and contact stiffness decide verdicts at the limit of the clearance, so they belong together: the time
+constant of a contact is four steps, its damping ratio 2. With a ratio of 1 a stick in some perfect assemblies rocks in
+its slot forever at 1 to 5 mm/s, with 1.5 still in 3 of 100. With a time constant of two steps a misaligned stick
 rattles over an edge that should stop it.
 """
 
@@ -22,21 +22,23 @@ class Physics:
 
     timestep_s: float = 0.001
     solref: tuple[float, float] = (0.004, 2.0)
+    """Time constant [s] and damping ratio of a contact."""
     solimp: tuple[float, float, float, float, float] = (0.99, 0.999, 0.001, 0.5, 2.0)
     """A soft impedance lets a grasp creep; 0.99 to 0.999 holds it to some micrometres a second."""
     impratio: float = 100.0
     """Stiff friction: without it a stick held off its centre turns in the hand by degrees a second."""
     condim: int = 3
-    """Between parts, whose corners resist turning anyway; the gripper's pads ask for torsional friction themselves."""
+    """Between parts: sliding friction only, since corners resist rotation anyway. Gripper pads set torsional friction
+    themselves."""
     tolerance: float = 1e-10
     iterations: int = 50
 
 
 def physics(timestep_s: float = 0.001) -> Physics:
-    """The settings for a time step: the contact's time constant is four steps.
+    """The settings for a time step; the time constant of contacts is four steps.
 
     Raises:
-        InputError: A step for which the settings were not checked.
+        InputError: A time step for which the settings were not checked.
     """
     require(
         0.0001 <= timestep_s <= 0.001,
@@ -47,7 +49,7 @@ def physics(timestep_s: float = 0.001) -> Physics:
 
 
 def set_options(option: Any, s: Physics) -> None:
-    """Give a model that is being made (`MjSpec.option`) these settings."""
+    """Set these options in a model (`MjSpec.option`) before it is compiled."""
     option.timestep = s.timestep_s
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -58,7 +60,7 @@ def set_options(option: Any, s: Physics) -> None:
 
 
 def set_contact(geoms: Iterable[Any], s: Physics) -> None:
-    """Give geoms of an `MjSpec` this softness."""
+    """Set stiffness and damping of contacts for geoms of an `MjSpec`."""
     for geom in geoms:
         geom.solref[:2] = s.solref
         geom.solimp = s.solimp

@@ -1,1 +1,1 @@
-"""One trial: its stages, its row, its fingerprint."""
+"""One trial: its stages from demonstration to verdict, its record, and the hash that identifies the record."""

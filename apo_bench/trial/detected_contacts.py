@@ -24,7 +24,7 @@ def with_detected_contacts(observation: Observation, source: str) -> Observation
 
 
 def count_contacts(right: Assembly, given: Assembly) -> dict[str, int]:
-    """How many of the given contacts are right, how many are missing, how many are false."""
+    """Count the true positive, false negative and false positive contacts of `given`, as columns of a record."""
     true = _contacts(right)
     named = _contacts(given)
     return {
@@ -35,4 +35,5 @@ def count_contacts(right: Assembly, given: Assembly) -> dict[str, int]:
 
 
 def _contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
+    """Pairs (operation that makes the contact, contact)."""
     return {(relation.made, relation.contact) for relation in assembly.relations()}

@@ -1,4 +1,4 @@
-"""Hashes that identify a record: version of the package, all input files, settings."""
+"""Hashes that identify a record: of the package version, all input files and the settings."""
 
 import json
 import shutil
@@ -20,8 +20,9 @@ _PACKAGES = (
     *("apo_bench", "mujoco", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
-"""The packages whose version may show in a record."""
+"""Packages whose version may change a record."""
 _CHECKOUT = Path(__file__).parents[2]
+"""Folder of the git checkout, if the package runs from one."""
 
 
 def versions() -> dict[str, str]:
@@ -34,6 +35,7 @@ def git_revision() -> str:
     git = shutil.which("git")
     if git is None or not (_CHECKOUT / ".git").exists():
         return ""
+    # --exclude=*: the revision, never the name of a tag
     command = [git, "-C", str(_CHECKOUT), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
 
@@ -42,7 +44,7 @@ def content_hash(scenario: Scenario, source: str | Path | Scenario, arm_files: P
     """16 hexadecimal digits over the files of a trial, the version of the package and its schemas.
 
     Args:
-        source: As for `load_scenario`.
+        source: The scenario as given to `load_scenario`.
         arm_files: `Arm.files`.
     """
     content = [content_pieces(scenario, source, arm_files), __version__, _SCHEMAS]
@@ -52,13 +54,12 @@ def content_hash(scenario: Scenario, source: str | Path | Scenario, arm_files: P
 def config_hash(config: TrialConfig, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting except method, seed and the path of the scenario.
 
-    Records with the same hash differ in method and seed alone, so they may be counted together or paired. A noise
-    model from a file, and your own noise, contact source or arm, count with what their files hold; a secret seed counts
-    by its hash.
+    Records with equal hashes differ in method and seed alone, so they may be pooled or paired. Noise models from files
+    and plugins (noise, contact source, arm) count by the content of their files, a secret seed by its hash.
 
     Args:
         content: From `content_hash`.
-        observation: The text of the observation's file; empty if the observation is drawn.
+        observation: Text of the observation file; empty if the observation is drawn.
     """
     settings = {k: v for k, v in asdict(config).items() if k not in ("method", "seed", "scenario", "secret_seed")}
     if config.secret_seed is not None:

@@ -1,7 +1,7 @@
-"""Move the plan of a correction along its free directions so that it fits: predicted to fit, stable, in reach.
+"""Fit a plan: move its target poses along free directions until it is predicted to fit, stable and in reach.
 
-A plan that fits stays as it is. So does one whose contacts are off, which no free direction repairs, and one for which
-no choice is found. The contacts are those that the corrector was given.
+The plan is left as it is if it fits, if its contacts are misaligned (which no free direction repairs), and if no choice
+is found. The contacts are those that the corrector was given.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.free_directions import free_space, nearest_fitting
 
 ROOMS_MM = (2.0, 0.5)
-"""Distance between parts that would meet, and from the edge over which a part would fall; the second if the first is
-not possible."""
+"""Distances to keep between parts, and of the centre of mass from an edge; the second is tried if the first fails."""
 _SLACK = 0.01
-"""Tolerance of a smaller distance that a part had before [mm]."""
+"""Room that a plan with less than the wanted room may still lose [mm]."""
 _ROOMY = ("on_way", "from_above")
-"""Measures of the room between parts."""
+"""Kinds of measures that are distances between parts."""
 _EXACT_M = 1e-9
-"""Contacts with a smaller gap hold as before."""
+"""Contacts with a smaller gap count as closed."""
 _LEAST_MM = 0.01
+"""Smaller moves are not listed."""
 _LEAST_DEG = 0.01
-"""Operations that move by less are not named."""
+"""Smaller moves are not listed."""
 
 
 class FreeMove(NamedTuple):
-    """How far the target pose of an operation was moved along what contacts leave free."""
+    """The move of one target pose along free directions of its contacts."""
 
     operation: int
     """Counted from 0."""
@@ -47,21 +47,25 @@ class FreeMove(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class FittingPlan:
-    """A plan, and how it was moved so that it fits."""
+    """A plan, and the moves that made it fit."""
 
     plan: Plan
     moves: tuple[FreeMove, ...] = ()
     """The poses that differ from the correction, in the order of operations."""
     why: str = ""
-    """What fails otherwise; empty if nothing was moved."""
+    """The failure predicted without the moves; empty if nothing was moved."""
 
     @property
     def sentence(self) -> str:
-        """`moved where contacts leave it free: operation 5 (cube) by 9.6 mm; otherwise ..`, or empty."""
+        """The moves in words, such as `moved where contacts leave it free: operation 5 (cube) by 9.6 mm; otherwise ..`.
+
+        Empty if nothing was moved.
+        """
         if not self.moves:
             return ""
         mains = [operation.main for operation in self.plan.assembly.operations]
         named = [
+            # A boolean factor leaves out rotations that print as 0.0.
             f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm" + f" and {turn_deg:.1f} deg" * (turn_deg >= 0.05)
             for k, shift_mm, turn_deg in self.moves
         ]
@@ -70,7 +74,7 @@ class FittingPlan:
 
 @check_arguments
 def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
-    """Plan the execution of a correction; free directions are chosen so that every motion fits and is in reach.
+    """Make the plan of a correction and move it along free directions so that every motion fits and is in reach.
 
     Args:
         correction: From `correct`.
@@ -79,7 +83,7 @@ def fit_plan(correction: Correction, observation: Observation, where: Scene | Sc
             counts as in reach.
 
     Returns:
-        The plan, its prediction of failure, and the moves along free directions.
+        The plan, and its moves along free directions.
 
     Raises:
         InputError: The correction did not converge.
@@ -97,7 +101,11 @@ def fit_plan(correction: Correction, observation: Observation, where: Scene | Sc
 
 
 def _fault(scene: Scene, plan: Plan) -> str | None:
-    """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
+    """The predicted failure of a plan, or that it is out of reach.
+
+    Returns:
+        None if nothing is wrong; empty if the failure cannot be repaired along free directions.
+    """
     prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
     if prediction.fails:
         return prediction.sentence if prediction.mendable else ""
@@ -105,12 +113,21 @@ def _fault(scene: Scene, plan: Plan) -> str | None:
 
 
 def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
-    """Everything that a plan is measured by, as `predict` does it."""
+    """The measures of a plan, as `predict` compares them.
+
+    Args:
+        room_mm: Stability must hold with the centre of mass this far off.
+    """
     return tuple(measures(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, room_mm))
 
 
 def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
-    """Goals near those of a plan that does not fit at which it does, (n, 4, 4); None if none were found."""
+    """Target poses, (n, 4, 4), near those of the plan, at which it fits; None if none were found.
+
+    Args:
+        plan: A plan that does not fit.
+        believed: The observation with the contacts and covariances that define the free directions.
+    """
     try:
         space = free_space(believed, plan.target_poses)
     except InputError:
@@ -121,11 +138,12 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
     allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
+        """Whether contacts hold as well as before, also those broken later, and nothing is predicted to fail."""
         moved = plan.with_target_poses(goals)
         held = all(
             (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
         )
-        return held and _fault(scene, moved) is None
+        return held and _fault(scene, moved) is None  # None: nothing fails
 
     for room_mm in ROOMS_MM:
         limits = _limits(before, _measured(scene, plan, room_mm), room_mm)
@@ -136,22 +154,31 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
 
 
 def _excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
-    """By how much each measure of a plan with other goals is too large."""
+    """Size less limit of each measure of the plan with target poses `goals`, (k,), [mm]."""
     return np.array([measure.size for measure in _measured(scene, plan.with_target_poses(goals), room_mm)]) - limits
 
 
 def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
-    """How large each measure may be: parts that would meet get room, all else has room or keeps what it had."""
+    """The limit of each measure, (k,), [mm].
+
+    Distances between parts must be at least `room_mm`. Where the plan has less and does not fail, it must keep what it
+    has. The same holds for the balance of a part.
+
+    Args:
+        before: The measures of the plan.
+        with_room: The same measures with `room_mm`.
+    """
     limits = []
     for plain, roomy in zip(before, with_room, strict=True):
         wanted = -room_mm if plain.kind in _ROOMY else plain.allowed
         had = (plain.kind == "falls" and not plain.exceeded) or (plain.kind in _ROOMY and plain.size <= 0.0)
+        # Sizes of distances are negative: a larger size is less room.
         limits.append(max(wanted, roomy.size + _SLACK) if had and roomy.size > wanted else wanted)
     return np.array(limits)
 
 
 def _earlier_gaps(plan: Plan) -> list[Array]:
-    """The largest |e| of each contact each time before work is taken apart, [m]."""
+    """The largest |e| of each contact, [m], one array for each time before parts are taken apart again."""
     return [
         build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
         for upto, goals in list_poses_in_force(plan)[:-1]
@@ -159,6 +186,7 @@ def _earlier_gaps(plan: Plan) -> list[Array]:
 
 
 def _moves(before: Array, after: Array) -> tuple[FreeMove, ...]:
+    """The moves between target poses `before` and `after`, (n, 4, 4) each, without negligible ones."""
     shifts = 1e3 * np.linalg.norm(after[:, :3, 3] - before[:, :3, 3], axis=1)
     turns = np.degrees(np.linalg.norm(pose.log(pose.inverse(before) @ after)[:, 3:], axis=1))
     return tuple(

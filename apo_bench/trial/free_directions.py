@@ -1,10 +1,10 @@
-"""Free directions of a plan: what contacts do not fix is chosen so that the plan fits, as near as possible to before.
+"""Search the free directions of a plan for the nearest target poses at which the plan fits.
 
-Directions that contacts leave free are the null space of their equations at the goals, in standard deviations of what
-was seen, so a shorter vector is a likelier plan. What would fail is linearised there, and the shortest vector that
-mends it is taken, again until nothing fails (least distance problems: Lawson and Hanson, "Solving Least Squares
-Problems", 23). Where that leads nowhere, it is begun at points of an even spread. From what fits the way back is gone
-as far as it fits. After each move the goals are put back onto all contacts.
+Free directions are the null space of the contact equations at the target poses. They are scaled by standard deviations
+of the observation, so a shorter vector is a likelier plan. Failures are linearised, and the shortest vector that
+repairs them is taken; this repeats until nothing fails (least distance problems: Lawson and Hanson, "Solving Least
+Squares Problems", 23). If that does not converge, the search restarts at evenly spread points. A point that fits is
+then moved back towards the start as far as it fits. After each move the poses are projected back onto all contacts.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,39 +30,46 @@ from apo_bench.correction.solvers import (
 from apo_bench.geometry import Array, pose
 
 _TRIED = 32
+"""Evenly spread points that are measured if the search from the plan fails."""
 _BEGUN = 4
-"""Places that are looked at where linearising leads nowhere, and how many of them are begun with."""
+"""The best of those points, from which the search restarts."""
 _TURNS = 5
-"""So often what fails is linearised."""
+"""Largest number of linearisations in one search."""
 _STEP = 0.05
-"""Of a derivative, in standard deviations."""
+"""Step of the finite differences, in standard deviations."""
 _BEYOND = 0.05
-"""What fails is mended by this more than asked for, since it bends."""
+"""Margin below the limit at which a linearised repair aims, since measures are nonlinear [mm]."""
 _HALVINGS = 6
+"""Bisections on the way back from a point that fits."""
 _EXACT_M = 1e-9
-"""Contacts that hold this well hold as before."""
+"""Contacts with a smaller gap count as closed."""
 _SHORTEST = 1e-9
+"""The least distance problem has no solution if the last residual is smaller."""
 
 Excess = Callable[[Array], Array]
-"""Goals, (n, 4, 4) -> by how much each measure of a plan is too large, (k,)."""
+"""Target poses, (n, 4, 4) -> size less limit of each measure of the plan, (k,), [mm]."""
 Fits = Callable[[Array], bool]
-"""Whether a plan with these goals, (n, 4, 4), fits."""
+"""Whether the plan with these target poses, (n, 4, 4), fits."""
 
 
 class _Held(NamedTuple):
-    """The contacts that hold at goals, and what puts other goals back onto them."""
+    """The contacts that hold at given target poses, to project other poses onto them."""
 
     system: Equations
     compact: CompactEquations
+    """`system` in compact form, for the solver."""
     exact: NDArray[np.bool_]
+    """(c,): whether the contact is an equation; the others are inequalities."""
     inequalities: Inequalities
     kept: NDArray[np.bool_]
+    """(c,): whether the contact holds at the given poses."""
     limits: Array
-    """(c,): how far each contact may be off, [m]."""
+    """(c,): largest violation of each contact, [m]."""
     L: Array
+    """(n, 6, 6): Cholesky factors of the covariances of the observed poses."""
 
     def put_back(self, goals: Array) -> Array | None:
-        """The nearest goals at which every contact holds as well as before; None if none were found."""
+        """The nearest poses, (n, 4, 4), at which every contact holds as well as before; None if none were found."""
         nearest = find_nearest_poses(self.compact.among(self.kept & self.exact), goals, self.L)
         off = compute_violations(self.system, self.exact, self.inequalities, nearest.poses)
         return nearest.poses if nearest.finite and (off <= self.limits)[self.kept].all() else None
@@ -71,10 +78,10 @@ class _Held(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """Goals that satisfy the contacts as well as some do, by coordinates s in free directions; there s is 0."""
+    """Target poses that satisfy the contacts, by coordinates s, (f,), in free directions; s = 0 are the given poses."""
 
     poses: Array
-    """(n, 4, 4), world frame, [m]."""
+    """(n, 4, 4), at s = 0, world frame, [m]."""
     twists: Array
     """(n, 6, f): the body twists of one standard deviation along each free direction, [m, rad]."""
     held: _Held
@@ -83,19 +90,23 @@ class FreeSpace:
         return self.twists.shape[2]
 
     def tangent(self, s: Array) -> Array:
-        """Goals moved along free directions, (n, 4, 4); contacts hold to first order."""
+        """Poses moved along free directions, (n, 4, 4); contacts hold to first order."""
         return np.asarray(self.poses @ pose.exp(self.twists @ s))
 
     def place(self, s: Array) -> Array | None:
-        """The same, put back onto the contacts; None if that cannot be."""
+        """`tangent(s)` projected back onto the contacts; None if the projection fails."""
         return self.held.put_back(self.tangent(s))
 
 
 def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
-    """What the contacts that hold at goals, (n, 4, 4), leave free; None if that is nothing, or too much.
+    """The directions that the contacts which hold at target poses, (n, 4, 4), leave free.
 
     Args:
-        observation: Contacts, and how uncertain each goal is; of what was not seen `UNKNOWN`.
+        observation: Contacts, and the covariance of each pose; operations that were not observed have `UNKNOWN`
+            instead.
+
+    Returns:
+        None if nothing is free, or if the plan is too large for the solver.
 
     Raises:
         InputError: A covariance is not positive definite.
@@ -110,11 +121,11 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
 
 
 def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
-    """Goals that fit, (n, 4, 4), as near as could be found; None if none were found.
+    """Target poses, (n, 4, 4), that fit and are as near as could be found; None if none were found.
 
     Args:
-        fits: The last word; only asked where nothing is in excess.
-        excess: As long as a number of it is above zero, that measure is too large.
+        fits: The final check, made only if no measure is in excess.
+        excess: Size less limit of each measure.
     """
     search = _Search(space, fits, excess)
     s = search.mended(np.zeros(len(space)))
@@ -124,7 +135,7 @@ def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | Non
 
 
 def even_points(dimensions: int) -> Iterator[Array]:
-    """Points (f,) spread evenly as a normal distribution is, the nearest first (Roberts' sequence)."""
+    """`_TRIED` points, (f,), evenly spread by a normal distribution, the nearest to 0 first (Roberts' sequence)."""
     from scipy.stats import norm
 
     # the real root of x^(d+1) = x + 1, by fixed point iteration: Roberts takes its negative powers as steps
@@ -137,16 +148,22 @@ def even_points(dimensions: int) -> Iterator[Array]:
 
 
 class _Search(NamedTuple):
+    """The search in a free space, by coordinates s, (f,)."""
+
     space: FreeSpace
     fits: Fits
     excess: Excess
 
     def fits_at(self, s: Array) -> bool:
+        """Whether the plan fits at s, after projection onto the contacts."""
         goals = self.space.place(s)
         return goals is not None and bool((self.excess(goals) <= 0.0).all()) and self.fits(goals)
 
     def mended(self, s: Array) -> Array | None:
-        """The nearest point at which what fails at s, linearised, does not; again from there until it fits."""
+        """The nearest point found at which nothing fails, from s on; None if linearised repairs lead to none.
+
+        Each step solves for the shortest vector that repairs every failure linearised so far.
+        """
         rows = np.zeros((0, len(s)))
         least = np.zeros(0)
         for _ in range(_TURNS):
@@ -162,16 +179,21 @@ class _Search(NamedTuple):
         return None
 
     def elsewhere(self) -> Array | None:
-        """A point that fits, begun with at those of an even spread at which least is in excess."""
+        """A point that fits, searched from the evenly spread points with the least total excess; None if none fits."""
         points = sorted(even_points(len(self.space)), key=self._much)
         fitting_points = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
         return next((s for s in fitting_points if s is not None), None)
 
     def _much(self, s: Array) -> float:
+        """Sum of all excesses at s."""
         return float(np.maximum(self.excess(self.space.tangent(s)), 0.0).sum())
 
     def nearer(self, far: Array) -> Array:
-        """From a point that fits back towards zero as far as it fits, and from there to the nearest that is found."""
+        """A point that fits and is nearer to 0 than `far`, which fits.
+
+        Bisection on the line to 0 gives the last point that fits. A new search starts just beyond it, where the plan
+        does not fit; its result is taken if it is nearer.
+        """
         inside = 1.0
         outside = 0.0
         # bisection between a point that fits and zero, which does not
@@ -183,7 +205,7 @@ class _Search(NamedTuple):
         return back if mended is None or mended @ mended > back @ back else mended
 
     def _linearised(self, s: Array) -> tuple[Array, Array]:
-        """Of each measure that is in excess at s: G s' >= h mends it."""
+        """(G, h) so that each measure in excess at s is repaired to first order where G s' >= h."""
         # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
         now = self.excess(self.space.tangent(s))
         over = now > 0.0
@@ -204,7 +226,10 @@ def shortest_above(G: Array, h: Array) -> Array | None:
 
 
 def _held(observation: Observation, goals: Array) -> _Held:
-    """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
+    """The contacts that hold at target poses, as equations and inequalities of the `contact` method.
+
+    If some contact does not hold that way, all contacts are plain equations instead.
+    """
     assembly = observation.assembly
     plain = build_contact_equations(assembly, observation.start, goals)
     system, exact, inequalities = list_contact_demands(plain, assembly, observation.play_m)
@@ -222,6 +247,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
         compact,
         exact,
         inequalities,
+        # kept: contacts that do not hold even as plain equations are ignored
         off <= observation.gap_m,
         limits,
         _factor(observation),
@@ -229,7 +255,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
 
 
 def _factor(observation: Observation) -> Array:
-    """L of the observation, as if everything had been seen."""
+    """Cholesky factors L of the observation's covariances, with `UNKNOWN` for operations that were not observed."""
     if observation.observed.all():
         return factor_noise(observation)
     covariance = np.where(observation.observed[:, None, None], observation.covariance, UNKNOWN)

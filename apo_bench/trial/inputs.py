@@ -1,7 +1,7 @@
-"""The files that shape a trial, and their digests: what a record's identity is made of.
+"""The files that determine a trial, and their digests, which identify a record.
 
-Python modules of the user count with the modules that they import from the same place, as far as their source names
-them. Data that such a module reads for itself does not count.
+Python plugins of the user count with the modules that they import from the same folder, as far as their source names
+them. Data files that a plugin reads do not count.
 """
 
 import hashlib
@@ -26,19 +26,19 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, find_scenario_path
 from apo_bench.scenario.parts import read_part
 
-_CHUNK = 1 << 20
+_CHUNK = 1 << 20  # bytes read at once
 
 
 def content_pieces(
     scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]
 ) -> dict[str, str]:
-    """What a trial of a scenario is made of -> 16 hexadecimal digits.
+    """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
-    The scenario (its file, or its numbers if it never was a file), each part with the files that state and draw it, the
-    arm with all that it was made of, the room, what networks have learned, the judge's thresholds.
+    Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
+    the weights of networks, and the judge's thresholds.
 
     Args:
-        source: What `load_scenario` was given.
+        source: The scenario as given to `load_scenario`.
         arm_files: `Arm.files`.
     """
     thresholds = json.dumps(asdict(scenario.thresholds), sort_keys=True).encode()
@@ -56,29 +56,29 @@ def content_pieces(
 
 
 def noise_content(*names: str) -> dict[str, str]:
-    """Of the noise models that are files or of one's own: `noise NAME` -> 16 hexadecimal digits over the file."""
+    """`noise NAME` -> 16 hexadecimal digits over the file, for noise models that are files or plugins."""
     paths = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
     return {name: digest_files([path]) for name, path in paths.items()} | own_content("noise", *names)
 
 
 def own_content(kind: str, *names: str) -> dict[str, str]:
-    """Of what is given as `module:name`: `KIND NAME` -> 16 hexadecimal digits over the files of the module."""
+    """`KIND NAME` -> 16 hexadecimal digits over the files of the module, for plugins `module:name`."""
     own = [name for name in names if is_own_code(kind, name)]
     digests = {f"{kind} {name}": _module_digest(name.partition(":")[0]) for name in own}
     return {name: found for name, found in digests.items() if found is not None}
 
 
 def own_files(name: str) -> tuple[Path, ...]:
-    """The files of what is given as `module:name`; none of any other name."""
+    """The files of a plugin `module:name`; empty for any other name."""
     is_own = all(is_own_code(column, name) for column in DATA_PREFIXES)
     return module_files(name.partition(":")[0]) if is_own else ()
 
 
 def digest_files(paths: Iterable[Path]) -> str:
-    """16 hexadecimal digits over what stands in files, in their order.
+    """16 hexadecimal digits over the contents of files, in order.
 
     Raises:
-        InputError: One of them cannot be read.
+        InputError: A file cannot be read.
     """
     found = []
     for path in paths:
@@ -91,26 +91,27 @@ def digest_files(paths: Iterable[Path]) -> str:
 
 
 def digest(content: bytes) -> str:
-    """16 hexadecimal digits."""
+    """16 hexadecimal digits of SHA-256."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 @cache
 def _module_digest(module: str) -> str | None:
-    """Over the source files of a module at the first call; None if it has none."""
+    """Digest of the source files of a module at the first call; None if it has none."""
     files = module_files(module)
     return digest_files(files) if files else None
 
 
 def module_files(module: str) -> tuple[Path, ...]:
-    """The source files of a module and of what it imports from the same folder; nothing is imported.
+    """The source files of a module and of its imports from the same folder, found without running it.
 
-    Of a module that is installed among other packages, only its own package counts.
+    For a module installed in site-packages, only files of its own package count.
     """
     top = module.partition(".")[0]
     spec = find_spec(top) or find_own_module(top)
     if spec is None or not spec.has_location or spec.origin is None:
         return ()
+    # of a package one folder above its own
     home = Path(spec.origin).parents[spec.submodule_search_locations is not None]
     others = ["apo_bench"]
     if home in {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}:
@@ -123,13 +124,14 @@ def module_files(module: str) -> tuple[Path, ...]:
 
 
 def _scenario_digest(scenario: Scenario, source: str | Path | Scenario) -> str:
+    """Digest of a scenario's file, or of its values if it is given as an object."""
     if isinstance(source, Scenario):
         return digest(json.dumps(_plain(scenario), sort_keys=True).encode())
     return digest_files([find_scenario_path(source)])
 
 
 def _plain(value: Any) -> Any:
-    """Nested dataclasses, mappings, sets and arrays as what `json` can write; file paths, already hashed, left out."""
+    """Nested dataclasses, mappings, sets and arrays as values for `json`; paths, hashed elsewhere, become None."""
     if is_dataclass(value):
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, np.ndarray):

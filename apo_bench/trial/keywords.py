@@ -1,4 +1,4 @@
-"""The configuration of a trial from keywords."""
+"""Build the configuration of a trial from keyword arguments."""
 
 from collections.abc import Mapping
 from pathlib import Path

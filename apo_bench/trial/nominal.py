@@ -1,6 +1,6 @@
-"""Nominal poses of a scenario, moved on the table to fit an observation; they use no contact, and no corrector.
+"""Place the nominal poses of a scenario on the table where an observation has them; no contact is used.
 
-Whatever the relative poses of a layout are, a plan of them builds the same assembly.
+Any placement on the table builds the same assembly, since only relative poses matter.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from apo_bench.geometry import Array, pose
 
 
 def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
-    """The nominal poses where x, y and yaw fit best the observed ones.
+    """Move the nominal poses by the x, y and yaw that fit the observed poses best.
 
     Least squares over all observed operations, each twist weighted with its stated covariance S = L L^t:
     min sum |L^-1 log((A N_k)^-1 G_k)|^2 over A = (x, y, yaw), with N_k nominal and G_k observed.
@@ -37,8 +37,8 @@ def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
 
 
 def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
-    """The nominal poses (n, 4, 4) shifted and turned on the table to the first operation that was observed, [m]."""
-    k = int(np.argmax(observation.observed))
+    """Move the nominal poses, (n, 4, 4), [m], on the table to match the first observed operation in x, y and yaw."""
+    k = int(np.argmax(observation.observed))  # the first observed operation
     # of the whole motion from nominal to observed only the yaw and the shift on the table are taken
     T = observation.poses[k] @ pose.inverse(nominal[k])
     flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
@@ -57,6 +57,6 @@ def _first_guess(nominal: Array, observed: Array) -> Array:
 
 
 def _planar(place: Array) -> Array:
-    """(x, y, yaw) as (4, 4)."""
+    """The pose (4, 4) on the table of (x, y, yaw), [m, rad]."""
     x, y, yaw = place
     return pose.at((x, y, 0.0), (0.0, 0.0, float(np.degrees(yaw))))

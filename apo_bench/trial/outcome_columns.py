@@ -1,4 +1,4 @@
-"""Columns of a record from what a method, its correction and a replay give: SI units in, mm and degrees out."""
+"""Fill the record columns of method, correction and replay: SI units in, mm and degrees out."""
 
 import math
 from collections.abc import Iterable
@@ -24,11 +24,11 @@ from apo_bench.trial.stages import Attempt
 def confidence_columns(
     result: MethodResult, observation: Observation, given: Observation, truth: Array | None
 ) -> TrialRecord:
-    """The test of the correction, whether the truth lies in its posterior, and how far the plan is from the truth.
+    """Columns on how far the correction can be trusted: its consistency test, and how far it is from the truth.
 
     Args:
         observation: With the true contacts.
-        given: With those that the corrector got.
+        given: With the contacts that the corrector got.
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
     right = observation.assembly
@@ -37,10 +37,11 @@ def confidence_columns(
 
 
 def _test(correction: Correction | None) -> TrialRecord:
+    """Columns of the correction's consistency test, and of contacts and observations that it rejected."""
     if correction is None:
         return {}
     inferred: TrialRecord = {
-        "dropped": list(correction.dropped),
+        "dropped_contacts": list(correction.dropped),
         "rejected_observations": [k + 1 for k in correction.left_out],
     }
     test = correction.test
@@ -50,12 +51,13 @@ def _test(correction: Correction | None) -> TrialRecord:
         "chi_square": float(test.chi_square) if math.isfinite(test.chi_square) else None,
         "chi_square_dof": int(test.freedom),
         "p_value": replace_infinite(test.p_value),
-        "consistency_passes": bool(test.passes),
+        "consistent": bool(test.passes),
         "suspects": [suspect.relation for suspect in test.ambiguous],
     }
 
 
 def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Array | None) -> TrialRecord:
+    """Whether the 95 % region of the correction contains the truth, and the plan's pose errors; empty without truth."""
     if truth is None:
         return {}
     correction = result.correction
@@ -69,7 +71,7 @@ def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Arr
 
 
 def method_columns(result: MethodResult) -> TrialRecord:
-    """What the method did, and how many operations its plan adds."""
+    """Columns of the method: corrected operations, tried corrections, gaps, extra steps and fit adjustments."""
     columns: TrialRecord = {
         "corrected_operations": [],
         "tried_corrections": [],
@@ -83,7 +85,7 @@ def method_columns(result: MethodResult) -> TrialRecord:
             for step, free, gap_m in result.correction.tried
         ]
     if result.plan is not None:
-        columns["extra_steps"] = len(result.plan.schedule) - len(result.plan.assembly)
+        columns["extra_steps"] = len(result.plan.schedule) - len(result.plan.assembly)  # steps beyond one per operation
     if result.fitting is not None:
         moves = result.fitting.moves
         columns["fit_adjustments"] = [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moves]
@@ -91,12 +93,16 @@ def method_columns(result: MethodResult) -> TrialRecord:
 
 
 def _numbers(operations: Iterable[int]) -> list[int]:
-    """Counted from 1, as whole numbers that JSON can hold."""
+    """Operations counted from 1, as `int`, since JSON cannot hold NumPy integers."""
     return [int(k) + 1 for k in operations]
 
 
 def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRecord:
-    """What a replay reached, and how far that is from the truth, (n, 4, 4), where it is known."""
+    """Columns of a replay and its verdict.
+
+    Args:
+        truth: (n, 4, 4), world frame, [m]; None if it is not known, which leaves pose errors null.
+    """
     result = attempt.result
     verdict = attempt.verdict
     conditions = verdict.rests_on
@@ -121,6 +127,7 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
 
 
 def _probing(found: ProbingResult | None) -> TrialRecord:
+    """Columns of the robot's probing; empty if it did not probe."""
     if found is None:
         return {}
     return {
@@ -134,6 +141,7 @@ def _probing(found: ProbingResult | None) -> TrialRecord:
 
 
 def _slip(each: SlipInHand) -> GraspSlip:
+    """Slip of a part in the hand, in mm and degrees: until its last motion began (`carried_*`), and until release."""
     return {
         "operation": each.operation + 1,
         "carried_mm": 1e3 * each.carried_m,
@@ -144,7 +152,7 @@ def _slip(each: SlipInHand) -> GraspSlip:
 
 
 def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
-    """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame."""
+    """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame; None if the replay did not end."""
     if final is None:
         return None
     packed = {part: pose.pack(T) for part, T in final.poses.items()}
@@ -152,4 +160,5 @@ def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
 
 
 def _mm(metres: float) -> float | None:
+    """Metres in millimetres; None if not finite."""
     return replace_infinite(metres * 1e3)

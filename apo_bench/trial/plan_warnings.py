@@ -1,4 +1,4 @@
-"""Sentences on what speaks against a plan, for commands."""
+"""Warnings about a plan, as sentences for commands."""
 
 import numpy as np
 
@@ -10,9 +10,10 @@ from apo_bench.simulation.scene import build_scene
 
 
 def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
-    """`the stated noise does not explain the correction (p = 0.0004); predicted: operation 3 (stick) will fail: ..`.
+    """The warnings about a plan in one sentence; empty if there are none.
 
-    Empty if nothing speaks against the plan.
+    For example: `the stated noise does not explain the correction (p = 0.0004); predicted: operation 3 (stick) will
+    fail: ..`.
 
     Args:
         correction: What the corrector returned; None without a corrector.
@@ -28,12 +29,12 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
 
 
 def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
-    """`panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.
+    """Whether an arm can execute a plan: the predicted failure, or how far the joints stay from their limits.
 
-    If nothing fails, the sentence states how far the joints stay from their limits.
+    For example: `panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.
 
     Args:
-        plan: None: the nominal one in the middle of its place on the table.
+        plan: None: the nominal plan in the middle of its region on the table.
 
     Raises:
         InputError: The arm is unknown, or its gripper cannot hold a part.

@@ -18,17 +18,18 @@ from apo_bench.trial.stages import observation_failure
 @final
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """What a method made of an observation: a plan, or why there is none."""
+    """The plan that a method made of an observation, or why there is none."""
 
     plan: Plan | None
     failure: Outcome | None
     gap_before_m: float
+    """Largest contact gap of the observed poses, or of those that the method uses uncorrected."""
     gap_after_m: float
-    """Of the plan; not a number without one."""
+    """Largest contact gap of the plan; not a number without one."""
     correction: Correction | None = None
-    """What the corrector returned; None without a corrector."""
+    """The result of the corrector; None without a corrector."""
     fitting: FittingPlan | None = None
-    """How the plan was moved so that it fits; None unless a corrector made it."""
+    """The moves of the plan along free directions; None unless a corrector made the plan."""
 
 
 def apply_method(
@@ -41,13 +42,13 @@ def apply_method(
     """Make the plan of a method.
 
     Args:
-        method: `oracle` takes the truth, `uncorrected` the observed poses, `nominal` the poses of the scenario of
-            `where`; anything else is a corrector or names one.
+        method: `oracle` plans with the truth, `uncorrected` with the observed poses, `nominal` with the poses of the
+            scenario of `where`; anything else is a corrector or names one.
         observation: As the planner has it: its contacts may be missing, false or detected, and are those of the plan.
         truth: (n, 4, 4) poses of the layout, world frame, [m]; only the oracle reads them.
-        reobserve: With it a corrector observes operations again.
-        where: What the plan of a corrector is executed in: it is moved along free directions so that it fits there.
-            None: it stays as the corrector made it.
+        reobserve: Lets a corrector observe operations again; None: it cannot.
+        where: Scene or scenario of the execution, in which the plan of a corrector must fit (`fit_plan`). None: the
+            plan stays as the corrector made it.
     """
     if isinstance(method, str):
         if method == "oracle" and truth is not None:
@@ -70,6 +71,7 @@ def apply_method(
 
 
 def _uncorrected(observation: Observation, poses: Array, failure: Outcome | None) -> MethodResult:
+    """The result of a method that plans with given poses, (n, 4, 4), or fails."""
     gap_m = measure_largest_gap(observation.assembly, observation.start, poses)
     if failure:
         return MethodResult(None, failure, gap_m, math.nan)

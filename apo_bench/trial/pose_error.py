@@ -1,4 +1,4 @@
-"""Pose errors of a plan or a replay, split into what contacts fix and what they leave free."""
+"""Pose errors of a plan or a replay, split into directions that contacts fix and directions that they leave free."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, find_least_turned, pose
 
 _RANK_CUT_OFF = 1e-7
-"""At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
+"""Relative cut-off: at consistent poses singular values of free directions are rounding, the others far larger."""
 
 
 def pose_errors(
     assembly: Assembly, start: Poses, truth_goals: Array, reached: ReachedState
 ) -> tuple[float | None, float | None]:
-    """The pose errors of main parts when their operations were over, as `goal_errors` has them.
+    """The pose errors of the main parts of a replay, each just after its operation, as in `goal_errors`.
 
     Returns:
         (fixed, free), [mm]; (None, None) if an operation was not finished.
@@ -25,12 +25,12 @@ def pose_errors(
 
 
 def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Array) -> tuple[float, float]:
-    """Root mean square per operation of the error of goals, in fixed and in free directions, [mm].
+    """Root mean square per operation of the error of target poses, in fixed and in free directions, [mm].
 
-    The error of an operation is the body twist from the true goal to the other one, rotations as the way of a point
-    40 mm off the origin. How far a part of revolution is turned about its axis is no error, unless it carries others.
-    The row space of the Jacobian of the contact equations at the truth is what the contacts
-    fix, its null space what they leave free.
+    The error of an operation is the body twist from the true pose to the given one. A rotation counts by the motion of
+    a point 40 mm from the origin. The rotation of a part of revolution about its axis is no error, unless the part
+    carries others. The row space of the Jacobian of the contact equations at the truth holds the fixed directions, its
+    null space the free ones.
 
     Args:
         assembly: With the right relations.
@@ -45,14 +45,14 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     goals = _turned_back(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
     _, J = build_contact_equations(assembly, start, truth_goals).linearise(truth_goals)
-    # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
+    # de = (J / unit) (unit dxi): the rows of J / unit span the fixed directions, and B^t B projects onto that span
     basis = _row_space(J / unit)
     fixed = basis.T @ (basis @ error)
     return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
 
 
 def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
-    """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
+    """`goals` with parts of revolution rotated about their axes nearest to the truth, unless they carry others."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
     return np.array([T if solid is None else find_least_turned(solid, T, true) for solid, T, true in pairs]).reshape(
@@ -61,6 +61,7 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
 
 
 def _rms_mm(error: Array, operations: int) -> float:
+    """Root mean square of an error, (6 n,), [m], per operation, in mm."""
     return float(np.linalg.norm(error) / np.sqrt(operations)) * 1e3
 
 

@@ -1,12 +1,12 @@
-"""Predicted success probability of a plan, before anything moves, from what the planner knows.
+"""Predict the success probability of a plan before the robot moves, from what the planner knows.
 
-Every explanation that a corrector kept states where things may truly be. Truths are drawn from them, in proportion to
-their weights, along directions that contacts leave free; robots are drawn from the stated errors of the robot. Each
-draw measures how far the plan is from failing: whether what is brought there fits (the measures of `prediction`), and
-whether faces overlap as the judge requires if that draw is the truth. The mean over the draws is the *score*; a table
+Every explanation that a corrector kept states possible true poses. Truths are drawn from the explanations, in
+proportion to their weights, along directions that contacts leave free. Robots are drawn from the stated robot errors.
+Each draw measures how far the plan is from failing: whether the placed parts fit (the measures of `prediction`), and
+whether faces overlap as the judge requires if that draw is the truth. The mean over the draws is the *score*. A table
 of other assemblies gives the share of plans with such a score that succeeded.
 
-A simulator only gives a scene, the reach of its arm, and the poses to which a robot with errors brings parts.
+The simulator only provides the scene, the reach of its arm, and the poses to which a robot with errors brings parts.
 """
 
 from __future__ import annotations
@@ -40,46 +40,51 @@ if TYPE_CHECKING:
     from apo_bench.simulation.scene.scene import Scene
 
 TRUTHS = 16
+"""Draws of the truth, over all explanations."""
 ROBOTS = 16
-"""Draws of the truth and, where the robot has stated errors, of those."""
+"""Draws of the robot's errors, if any are stated."""
 _STREAM = 2_030
-"""Stream of the draws, the same for every plan; no trial uses it."""
+"""Seed of the draws, the same for every plan; no trial uses it."""
 _SLACK_MM = 0.05
-"""Standard deviation of what a measure leaves out: sag, rest, compliance."""
+"""Standard deviation of effects that the measures neglect: sag, rest, compliance."""
 _SLACK_SHARE = 0.1
-"""The same of an overlap."""
+"""The same for an overlap, as a share of the face."""
 _FARTHEST_M = 0.02
+"""Largest standard deviation of a draw along a free direction, as translation."""
 _FARTHEST_RAD = 0.5
-"""Largest standard deviation of a draw along a free direction of which nothing is known."""
+"""The same as rotation."""
 _FALLS = 0.02
-"""How near to fitting a plan is in which a part would fall or lean."""
+"""Factor of the score for each part that would fall or lean."""
 _LEVEL = 0.5
-"""An insertion axis is level if its cosine with the vertical is smaller: no weight helps there, only the play."""
+"""An insertion axis is level if its cosine with the vertical is smaller: weight does not help the insertion there."""
 _WEIGHED = ("falls", "leans")
+"""Kinds of measures of stability, which no draw changes."""
 _UNKNOWN = 0.5
-"""The share where no truth could be drawn at which faces meet."""
+"""Share of overlaps if the faces meet in no drawn truth."""
 _LEAST_WEIGHT = 0.01
-"""Explanations that are less likely are passed over."""
+"""Explanations with a smaller weight are ignored."""
 
 
 class PossibleTruth(NamedTuple):
-    """What may be true, and how likely that is; the weights sum to 1 at most."""
+    """One explanation of the observation: possible true poses and their probability; the weights sum to at most 1."""
 
     weight: float
     believed: Observation
+    """The observation as this explanation assumes it."""
     poses: Array
     """(n, 4, 4), world frame, [m]."""
     dropped: tuple[str, ...] = ()
+    """Contacts that are false in this explanation."""
     turned: bool = False
-    """Whether the turn of the assembly on the table is unknown, since nothing was observed."""
+    """Whether the yaw of the assembly on the table is unknown, since nothing was observed."""
 
 
 def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[PossibleTruth, ...]:
-    """Those that a corrector kept; without any, its estimate alone.
+    """The explanations that a corrector kept, likely ones only; without any, its estimate alone.
 
     Args:
         believed: The observation that the corrector was given.
-        goals: (n, 4, 4), of the plan.
+        goals: (n, 4, 4), target poses of the plan.
     """
     blind = not believed.observed.any()
     if correction is None:
@@ -87,6 +92,7 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     if not correction.hypotheses:
         return (PossibleTruth(1.0, correction.assumed or believed, correction.poses, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
+    # Factor that gives the weight of ignored explanations to the likely ones.
     share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
     return tuple(PossibleTruth(share * each.weight, each.assumed, each.poses, each.dropped, blind) for each in likely)
 
@@ -100,16 +106,16 @@ def predict_success(
     spiral: bool = False,
     probing: bool = False,
 ) -> float:
-    """The probability that a plan succeeds; the same for the same arguments.
+    """The probability that a plan succeeds; the result is deterministic.
 
     Args:
         plan: With the contacts that the planner was given.
         believed: The observation that the planner was given, with its contacts.
         correction: The correction of it; None without a corrector.
-        where: What the plan is executed in. In a scenario, everything counts as in reach.
-        robot_error: The stated errors of the robot, as in records; a scenario does not use them.
-        spiral: The robot searches for a hole in a spiral where a motion into it is stopped.
-        probing: The robot probes first and compensates its errors: only the slip of parts in its hand is left.
+        where: Scene of the execution. For a scenario, every pose counts as in reach.
+        robot_error: The stated errors of the robot, as in records; ignored for a scenario.
+        spiral: The robot searches for a hole in a spiral if an insertion is stopped.
+        probing: The robot probes first and compensates its errors; only the slip of parts in its hand remains.
     """
     explained = explanations(correction, believed, plan.target_poses)
     score = plan_score(plan, explained, where, robot_error, spiral, probing)
@@ -117,8 +123,8 @@ def predict_success(
 
 
 def abstain(predicted_success: float, least: float) -> Outcome:
-    """The ending of a trial whose plan has a lower predicted success than the least that is required."""
-    # as many digits as tell the two apart: 0.947, where 0.95 is required
+    """The ending of a trial whose predicted success is below the required least."""
+    # as many digits as distinguish the two: 0.947, if 0.95 is required
     shown = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
     why = f": {shown}, where {least:.15g} is required"
     return Outcome("predicted-success", "abstained", None, describe_outcome("abstained") + why)
@@ -156,14 +162,17 @@ def plan_score(
 def _by_arm(
     plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
 ) -> tuple[tuple[Poses, ...], tuple[ArmMove, ...]]:
-    """Where robots with drawn errors bring the parts, as in `drawn_measures`, and the moves of the arm."""
+    """Poses of parts placed by robots with drawn errors, as `drawn_measures` takes them, and the motions of the arm.
+
+    The poses are empty if the robot has no errors, or if a pose is out of reach.
+    """
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought, left_after_feeling, stack_errors
     from apo_bench.trial.stages import robot_error_of
 
     arm = arm_moves(plan, scene, spiral)
     slip = parse_robot_error(robot_error).in_hand
-    right = not any(slip) if probing else robot_error == NO_ROBOT_ERROR
+    right = not any(slip) if probing else robot_error == NO_ROBOT_ERROR  # whether the robot has no errors that count
     if right or any(move.refused is not None for move in arm):
         return (), arm
     errors = [robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS)]
@@ -173,18 +182,18 @@ def _by_arm(
 
 
 def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
-    """Standard normal numbers of one of the robots that are drawn, of one stream."""
+    """Standard normal numbers, (*shape), of robot number `draw`, from stream `which` of the robot's errors."""
     return np.asarray(_robot_draws(which, shape)[draw])
 
 
 @lru_cache(maxsize=16)
 def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
-    """Those of all robots, (robots, *shape); always the same."""
+    """Standard normal numbers of all robots, (`ROBOTS`, *shape), the same in every call."""
     return _spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)
 
 
 def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
-    """Draw poses that may be the truth, (count, n, 4, 4), along what contacts leave free."""
+    """Draw possible true poses of an explanation, (count, n, 4, 4), along directions that contacts leave free."""
     goals = explanation.poses
     try:
         space = free_space(explanation.believed, goals)
@@ -196,26 +205,30 @@ def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator
         truths = np.array([space.tangent(widths * s) for s in _spread(rng, count, (len(space),))])
     if explanation.turned:
         middle = pose.at(goals[:, :3, 3].mean(axis=0))
+        # Yaws are spread evenly over the full turn, in random order, about the mean position.
         turns = [pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw)) for yaw in 360.0 * (rng.permutation(count) + 0.5) / count]
         truths = np.array([middle @ turn @ pose.inverse(middle) @ T for turn, T in zip(turns, truths, strict=True)])
     return truths
 
 
 def _widths(space: FreeSpace) -> Array:
-    """How far to draw along each free direction, in its stated standard deviations, (f,)."""
+    """Standard deviation of draws along free directions, (f,), relative to the stated one, bounded by `_FARTHEST_*`."""
     far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
     turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
     return np.asarray(1.0 / np.maximum(1.0, np.maximum(far, turned)))
 
 
 def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Array:
-    """Standard normal numbers, (count, *shape), of each place one in every part of equal probability (McKay, 1979)."""
+    """Latin hypercube sample of standard normal numbers, (count, *shape) (McKay, 1979).
+
+    Each number falls into its own interval of equal probability among the `count` samples.
+    """
     parts = rng.permuted(np.tile(np.arange(count), (math.prod(shape), 1)), axis=1).T
     return np.asarray(ndtri((parts + rng.uniform(size=parts.shape)) / count).reshape(count, *shape))
 
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
-    """The assembly without dropped contacts."""
+    """The assembly without the named contacts."""
     left = {
         (relation.made, relation.contact)
         for relation, kept in zip(assembly.relations(), assembly.without(dropped), strict=True)
@@ -229,16 +242,18 @@ def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
 
 
 def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Poses]) -> float:
-    """How surely all measures of a plan are within their limits, from 0 to 1.
+    """Probability that all measures of a plan are within their limits, as a product over measures, mean over robots.
 
     Args:
-        ends: Where robots with drawn errors bring the parts, as in `drawn_measures`; none: as planned.
+        ends: From `_by_arm`; empty: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
+    # per operation, for `_within`
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     lengths = where.clearance_mm, scenario.thresholds
     planned = measures(plan, *lengths, scenario.attach, arm=arm)
+    # With drawn robots only stability comes from the plan itself; the other measures are drawn.
     stands = np.prod([_within(each, less_mm) for each in planned if each.kind in _WEIGHED or not ends])
     if not ends:
         return float(stands)
@@ -247,10 +262,10 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
 
 
 def _within(measure: Measure | DrawnMeasure, less_mm: Sequence[float]) -> Array:
-    """How surely one measure is, (), or (r,) of several draws.
+    """Probability that one measure is within its limit, (), or (r,) for r draws.
 
     Args:
-        less_mm: By how much less than the judge what goes in allows, of each operation.
+        less_mm: Per operation, reduction of the judge's limit for insertion contacts, [mm].
     """
     if isinstance(measure, Measure) and measure.kind in _WEIGHED:
         return np.asarray(_FALLS if measure.exceeded else 1.0)
@@ -259,12 +274,16 @@ def _within(measure: Measure | DrawnMeasure, less_mm: Sequence[float]) -> Array:
 
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
-    """How surely faces overlap as the judge requires, if the plan is executed exactly and one of these is the truth."""
+    """Probability that faces overlap as the judge requires, if the plan is executed exactly; mean over the truths.
+
+    Args:
+        truths: From `draw_truths`, (count, n, 4, 4).
+    """
     scenario = where if isinstance(where, Scenario) else where.scenario
     overlaps = least_overlaps(
         plan.assembly, compute_placements(plan.assembly, plan.start, plan.target_poses)[-1], truths
     )
-    possible = overlaps[np.isfinite(overlaps)]
+    possible = overlaps[np.isfinite(overlaps)]  # without truths in which faces do not meet
     if not len(possible):
         return _UNKNOWN
     return float(np.mean(ndtr((possible - scenario.thresholds.overlap_fraction) / _SLACK_SHARE)))

@@ -1,6 +1,6 @@
-"""Success rates of plans by score, of generated assemblies; `python -m benchmarks.predicted_success` writes them.
+"""Table of success rates of plans by score, from generated assemblies; rates between two scores are interpolated.
 
-Between two scores the rate is interpolated.
+`python -m benchmarks.predicted_success` writes this file.
 """
 
 SCORES = (

@@ -1,4 +1,4 @@
-"""Run a trial as a command requests it: options, an observation file, a film."""
+"""Run a trial as a command requests it: read its options and observation file, write its film and observation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -40,19 +40,20 @@ from apo_bench.trial.stages import (
 )
 
 Show = Callable[[Rollout], None]
+"""Shows the rollout of a trial, for example in a window."""
 _DRAWN = (
     *(NOISE_LEVEL.name, "noise_mm", "noise_deg", "human_error_scale", "noise", "contact_source"),
     *("pose_source", "max_reobservations", "robot_error", "seed", "secret_seed_file"),
 )
 """Options without a meaning for an observation from a file, except `contact_source` with given or detected contacts."""
 _MEASURED_AIR_M = 5e-3
-"""How far a measured start may be off: as far apart as `loose_success` lets faces be."""
+"""Largest gap below a part in a measured start, as large as `loose_success` allows between faces."""
 
 
 @final
 @dataclass(frozen=True)
 class Request:
-    """One trial of a command."""
+    """One trial as a command requests it."""
 
     scenario: str
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -60,14 +61,16 @@ class Request:
     observation: Path | None = None
     """File to read the observation from instead of drawing it."""
     save_observation: Path | None = None
+    """File to write the observation to."""
     video: Path | None = None
+    """File to write the film to."""
 
 
 def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
-    """The settings of a request.
+    """The configuration of a request.
 
     Args:
-        clearance_mm: Of the scenario, if the request does not state it.
+        clearance_mm: Default, from the scenario.
 
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
@@ -101,6 +104,7 @@ def _refuse_drawing(request: Request, options: Mapping[str, Any]) -> None:
 
 
 def _option(name: str) -> str:
+    """The name of a setting as a command line option."""
     return "--" + name.replace("_", "-")
 
 
@@ -111,18 +115,19 @@ def load_or_draw_observation(
     deviation_mm: float | None,
     deviation_deg: float | None,
 ) -> tuple[Observation, bool]:
-    """The observation of a file or else of a trial, and whether standard deviations had to be assumed.
+    """The observation of a file, or of a drawn trial, and whether default standard deviations were assumed.
 
     Args:
-        path: The file; None draws a trial and replays nothing.
-        options: What only a trial has: noise level, seed, noise and so on, as in `Request`.
-        deviation_mm, deviation_deg: What only a file may need.
+        path: The file; None: demonstrate and observe a trial, without a replay.
+        options: Settings of a drawn trial, as in `Request`.
+        deviation_mm, deviation_deg: Standard deviations for a file that states none.
 
     Raises:
-        InputError: One of the two was given with the other, or something is not allowed.
-        RuntimeError: The human's own assembly is not right in this trial.
+        InputError: An option of a file without a file, an option of a trial with one, or a value that is not allowed.
+        RuntimeError: The demonstration itself failed in this trial.
     """
     of_file = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    # Options that do not apply must be None.
     refused, reason = (of_file, "is for files") if path is None else (options, "draws a trial")
     for name, value in refused.items():
         where = "without" if path is None else "together with"
@@ -145,12 +150,13 @@ def load_or_draw_observation(
 
 
 def _observe(config: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
+    """The observation of a trial, as the same settings always draw it."""
     noise = noise_of(config, scene, simulated)
     return observe_demonstration(simulated, noise, config.seed, config.secret_seed)
 
 
 def checked_request(request: Request) -> tuple[Scenario, TrialConfig]:
-    """The scenario and the settings of a request.
+    """The scenario and the configuration of a request, checked before anything is run.
 
     Raises:
         InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
@@ -176,7 +182,7 @@ def run_request(request: Request, show: Show | None = None) -> TrialRecord:
 
 
 def run_settings(request: Request, config: TrialConfig, show: Show | None = None) -> TrialRecord:
-    """Run the trial of these settings; the request names the files to read and to write.
+    """Run the trial of a configuration; the request states which files to read and to write.
 
     Args:
         show: As in `run_request`.
@@ -202,7 +208,7 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
             write_form(observation_form(_observe(config, scene, simulated), name), request.save_observation)
         content = content_hash(scene.scenario, config.scenario, scene.arm.files)
         record = record_trial(config, scene, simulated, content, watch=watch)
-    if track is None or record["sim_time_s"] is None:
+    if track is None or record["sim_time_s"] is None:  # nothing was replayed, so there is nothing to show
         return record
     if simulated is not None:
         observation = _observe(config, scene, simulated)

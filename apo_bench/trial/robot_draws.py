@@ -1,9 +1,8 @@
-"""Where a robot with errors brings the parts of a plan: geometry, no physics.
+"""Compute where a robot with errors places the parts of a plan, by geometry without physics.
 
-The hand goes where the errors put it. Closing, its pads centre the part between them and lie flat on it, so what is
-wrong along and about them when the part is taken is taken along, and what is wrong across them is not. What is let go
-comes to rest on what carries it and against what it was slid to; where the hand closes on it once more, across, it is
-centred there, too.
+The tip deviates by the errors of the robot. When the gripper closes, its pads centre the part between them and lie flat
+on it. Errors along and about the pads remain in the hand, errors across them do not. A released part comes to rest on
+its supports and sides. If the gripper then closes on it once more, across, the part is centred there, too.
 """
 
 from collections.abc import Sequence
@@ -21,39 +20,42 @@ from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 
 _CENTRED = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
-"""Of a twist in the frame of the tip, whose first axis the pads close along: what is left once they have closed."""
+"""Factors of a part's twist (v, w) in the tip frame after the pads close along x: x and turns about y, z vanish."""
 _PICK = 1
-"""Of the key poses of a transfer; the last one is its goal."""
+"""Index of the pick pose among the key poses of a transfer; the last one is the goal."""
 _UP = np.array([0.0, 0.0, 1.0])
 _ERRORS = tuple(field.name for field in fields(RobotError))
 
 
 def stack_errors(errors: Sequence[RobotError]) -> RobotError:
-    """Several robots as one, for `brought`: each array has one more axis before the last ones of a pose, (r, ...)."""
+    """Several robots as one, for `brought`: every array gets a leading axis r; `in_hand` keeps the operation first."""
     hand_eye, joints, tool, in_hand = (np.array([getattr(each, name) for each in errors]) for name in _ERRORS)
+    # (operations, r, 4, 4), so that in_hand[k] is of all robots.
     return RobotError(hand_eye, joints, tool, in_hand.swapaxes(0, 1))
 
 
 def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -> tuple[Poses, ...]:
-    """Every part when a robot with these errors puts one, for each step of the schedule that does: the others rest.
+    """Poses of every part after each step of the schedule that places one; parts placed before are at rest.
 
-    What is pushed in level floats on its way, as it is carried out.
+    Undo steps have no entry. A part with a level insertion floats above its support, as in the execution.
 
     Args:
-        error: Of one robot, or of several from `stack_errors`, which have poses (r, 4, 4) of what they moved.
+        error: Of one robot, or of r robots from `stack_errors`; then moved parts have poses (r, 4, 4).
         spiral: As in `plan_moves`.
     """
     resting = plan.start
     states = list[Poses]()
-    for move in plan_moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral, ()):
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]
+        # Displacements of the tip at pick and at release, world frame.
         taken, let_go = [
             error.hand_eye @ _leant(scene, solve_key_angles(t, scene).reached[i], error) for i in (_PICK, -1)
         ]
         last = t.grips[-1].T_part_tip
         held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.tool, resting[t.part])
+        # part pose at release
         put = let_go @ t.T_world_goal @ last @ error.tool @ error.in_hand[k] @ held @ pose.inverse(last)
         now = compute_transferred_poses(operation, put, resting)
         if move.step.undo:
@@ -70,34 +72,41 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
 
 
 def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: float) -> RobotError:
-    """What is left of errors once a robot has felt: how parts slipped in its hand, but for what laying and search tell.
+    """The errors that remain after probing: slips in the hand, without what laying down and searching correct.
 
     Args:
-        slip_deg: Standard deviation of how a part turns in the hand.
+        slip_deg: Standard deviation of the rotation of a part in the hand.
     """
     left = np.array(error.in_hand)
     for move in plan_moves(plan, scene, True, PROBING_ACTIONS):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
         if t.flat is not None:
+            # touch points on the part
             felt = np.array([place.point for place in t.side_touches]) if t.side_touches else t.flat.feet
             lever = float(np.linalg.norm(felt - felt.mean(axis=0), axis=1).max())
             told = TOUCH_SIGMA_M / lever
+            # Twist index 2: z along the pads, corrected; index 3: rotation, reduced to what touches leave.
             slip[2:4] *= 0.0, told / np.hypot(told, np.radians(slip_deg))
         if t.side_touches or t.front is not None:
-            slip[1] = 0.0
+            slip[1] = 0.0  # y along the pads, found by touch
         left[move.step.operation] = pose.exp(slip)
     none = np.eye(4)
     return RobotError(none, np.zeros_like(error.joints), none, left)
 
 
 def _held(grip: Grip, tip: Array, T_part: Array) -> Array:
-    """How a part that stands at T_part is off in the hand once its pads have closed at a tip, in its frame."""
+    """Displacement of a part in the hand, tip frame, (*, 4, 4), once the pads have closed.
+
+    Args:
+        tip: World pose of the tip, (*, 4, 4).
+        T_part: World pose of the part before the pads close, (*, 4, 4).
+    """
     return np.asarray(pose.exp(_CENTRED * pose.log(pose.inverse(tip) @ T_part @ grip.T_part_tip)))
 
 
 def _leant(scene: Scene, q: Array, error: RobotError) -> Array:
-    """Where wrong zeros of the joints take the tip at joint angles q, a displacement of the world, (*, 4, 4)."""
+    """World displacement of the tip due to wrong joint zeros at joint angles q, (*, 4, 4)."""
     if not error.joints.any():
         return np.eye(4)
     right = pose.inverse(scene.kinematics.forward(q))

@@ -1,4 +1,4 @@
-"""A trial as something to show: demonstration and replay, and poses as observed, as corrected and true."""
+"""Assemble a rollout for display: demonstration and replay of a trial, with observed, corrected and true poses."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +14,7 @@ from apo_bench.simulation.film.track import FilmTrack, Segment, scenario_segment
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
+# Names of the poses in a rollout.
 AS_SEEN = "as seen"
 AS_CORRECTED = "as corrected"
 AS_TRUE = "true"
@@ -22,18 +23,18 @@ AS_TRUE = "true"
 @final
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """One trial, or what a scenario asks for."""
+    """The segments of one trial, or of a scenario, and the poses to show with them."""
 
     scene: Scene
     segments: tuple[Segment, ...]
     assembled: Poses
-    """Where the parts belong in the end."""
+    """Final poses that are right, or as planned if the truth is not known."""
     poses: Mapping[str, Array] = field(default_factory=dict)
-    """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
+    """Name, such as `as seen` -> (n, 4, 4), world frame, [m]."""
 
 
 def scenario_story(scene: Scene) -> Rollout:
-    """What a scenario asks for, operation by operation."""
+    """The rollout of a scenario: its nominal assembly, operation by operation."""
     layout = place_layout(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
     segment = scenario_segment(scene, layout.start, layout.poses)
     return Rollout(scene, (segment,), compute_placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
@@ -47,11 +48,14 @@ def trial_story(
     record: TrialRecord,
     simulated: SimulatedDemonstration | None = None,
 ) -> Rollout:
-    """What is to be seen of a trial that was replayed.
+    """The rollout of a trial that was replayed.
 
     Args:
-        track: What watched the replay.
-        simulated: Its demonstration, which is run once more; None of a measured observation, whose truth is not known.
+        spec: Settings of the trial.
+        seen: Its observation.
+        track: The recording of the replay.
+        record: The record of the replay.
+        simulated: Its demonstration, which is simulated again to record it; None for an observation from a file.
     """
     plan = track.plan
     assert plan is not None
@@ -78,7 +82,7 @@ def trial_story(
 
 
 def ending(record: TrialRecord) -> str:
-    """How a replay ended: `failure at operation 3 (force_stop): the motion .. was stopped`."""
+    """The outcome of a replay: `failure at operation 3 (force_stop): the motion .. was stopped`."""
     if record["success"]:
         return f"success: {record['sentence']}"
     operation = record["failure_operation"]
@@ -87,6 +91,7 @@ def ending(record: TrialRecord) -> str:
 
 
 def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Segment:
+    """The segment of the demonstration, simulated once more to record it."""
     track = FilmTrack()
     watch_again(scene, simulated, spec.human_error_scale, spec.seed, spec.secret_seed, track.hooks)
     observed = f"observed with noise of {spec.noise_mm:g} mm and {spec.noise_deg:g} deg"

@@ -1,8 +1,8 @@
 """Run one trial: demonstrate, observe, choose contacts, correct, fit, predict, execute, judge, record.
 
-Noise enters through the streams of `stages` alone: layout, human, observation, contacts, robot and sensor draw from
-one each. The stage that fails makes the outcome with its code (`records.outcomes` has all of them); this module only
-passes it on. Everything here is in m and rad; `outcome_columns` turns it into the mm and degrees of a record.
+All random numbers come from the streams of `stages`: layout, human, observation, contacts, robot and sensor use one
+each. A stage that fails ends the trial with its failure code (all are in `records.outcomes`). Units here are m and rad;
+`outcome_columns` converts them to the mm and degrees of a record.
 """
 
 from collections.abc import Callable
@@ -74,15 +74,15 @@ MEASURED: TrialRecord = {"noise_mm": None, "noise_deg": None, "human_error_scale
 @final
 @dataclass(frozen=True, eq=False)
 class RunContext:
-    """What all steps of one trial share."""
+    """The arguments that all steps of one trial share."""
 
     scene: Scene
     config: TrialConfig
     method: Method
-    """The parsed method; its corrector may also be the corrector itself."""
+    """The parsed method; its `corrector` is a name or a callable."""
     callbacks: Callbacks | None = None
     cache: ReplayCache | None = None
-    """What replays of one scene and seed have in common; it changes nothing but the time they take."""
+    """States that replays of one scene and seed share; it changes only the computing time."""
 
 
 @check_arguments
@@ -188,12 +188,16 @@ def _plan_and_replay(
     truth: Array | None,
     reobserve: Reobservations | None,
 ) -> TrialRecord:
-    """Correct, fit, predict, execute and judge.
+    """Run the trial after its observation: correct, fit, predict, execute and judge.
 
     Args:
         observation: With the true contacts.
         given: The same with the contacts that the corrector gets.
         truth: (n, 4, 4) poses of the layout, world frame, [m]; None if they are not known.
+        reobserve: Lets the corrector observe again; None for an observation from a file.
+
+    Returns:
+        The columns of method, prediction and outcome.
     """
     config = context.config
     corrector, spiral, probe = context.method
@@ -209,8 +213,11 @@ def _plan_and_replay(
         if predicted_success < config.min_predicted_success:
             record = end_record(abstain(predicted_success, config.min_predicted_success), success=False)
         else:
-            # a plan states poses; the contacts that these make are the true ones
-            record = _replay(context, replace(planned.plan, assembly=observation.assembly), observation, truth)
+            plan = planned.plan
+            if plan.assembly is not observation.assembly:
+                # The robot executes poses only, so replay and judge use the true contacts, not those of the planner.
+                plan = replace(plan, assembly=observation.assembly)
+            record = _replay(context, plan, observation, truth)
         record |= {"failure_prediction": prediction, "predicted_success": predicted_success}
     record |= method_columns(planned) | confidence_columns(planned, observation, given, truth)
     if planned.correction is not None:
@@ -221,13 +228,14 @@ def _plan_and_replay(
 
 
 def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Array | None) -> TrialRecord:
-    """Execute a plan and judge what it reached, with the nominal poses in place of a truth that is not known."""
+    """Execute and judge a plan; if the truth is None, the judge compares with the nominal poses."""
     config = context.config
     scene = context.scene
     reference = move_nominal_poses(scene.scenario.nominal_poses, observation) if truth is None else truth
     _, spiral, probe = context.method
     error = draw_robot_error(config.robot_error, scene, config.seed, config.secret_seed)
     probing = None
+    # The robot knows assumed standard deviations of its errors, never the drawn errors.
     if probe:
         assumed = parse_assumed_error(config.assumed_robot_error, config.robot_error)
         key = stream_key(config.seed, WRENCH, config.secret_seed)
@@ -239,7 +247,10 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
 
 
 def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array | None) -> Observation:
-    """The observation as a corrector gets it: with the given, detected or wrong contacts of `contact_source`."""
+    """The observation as the corrector gets it, with given, detected or wrong contacts by `contact_source`.
+
+    Without a truth (an observation from a file) no wrong contacts are drawn.
+    """
     if not uses_contacts(config.method):
         return observation
     if config.contact_source in DETECTED:
@@ -269,11 +280,11 @@ def probing_config(
     ft_sensor: str = USUAL_FT_SENSOR,
     actions: tuple[str, ...] = PROBING_ACTIONS,
 ) -> ProbingConfig:
-    """How a robot probes: with assumed standard deviations of its errors, never with the errors themselves.
+    """The configuration of a robot that probes: assumed standard deviations of its errors, never the errors themselves.
 
     Args:
-        assumed: Standard deviations, as in a record; None: usual ones.
-        seed: Of the noise of the force-torque sensor.
+        assumed: Standard deviations, as in a record; None: default ones for an unknown robot.
+        seed: Seed of the noise of the force-torque sensor.
         ft_sensor: As in a record.
         actions: Of `PROBING_ACTIONS`.
 
@@ -288,7 +299,7 @@ def probing_config(
 def record_trial(
     config: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any
 ) -> TrialRecord:
-    """The record of a trial, also of one whose corrector misbehaves, or returns what no record can hold.
+    """The record of a trial, also if its corrector misbehaves or returns values that no record can hold.
 
     Args:
         more: Further arguments of `run_trial`.
@@ -298,6 +309,7 @@ def record_trial(
     """
     try:
         record = run_trial(config, scene, simulated=simulated, content=content, **more)
+        # A colon marks a plugin, whose results are checked.
         wrong = unwritable(record) if ":" in config.method else ""
         if not wrong:
             return record

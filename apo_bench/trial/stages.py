@@ -1,4 +1,4 @@
-"""Stages that every method of a trial shares: demonstrate, observe, replay, judge; all random numbers enter here."""
+"""Stages that all methods share: demonstrate, observe, replay, judge; every random number of a trial is drawn here."""
 
 from __future__ import annotations
 
@@ -39,19 +39,22 @@ if TYPE_CHECKING:
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE, TV, REOBSERVE, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(
     12
 )
-"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing; four are of
-what is wrong with the robot, the last one is the noise of the sensor at its wrist."""
+"""Random streams of a trial, one per source of randomness; renumbering them changes all trials.
+
+`ARM` is reserved. `HAND_EYE`, `JOINTS`, `TOOL` and `IN_HAND` are the errors of the robot, `WRENCH` is the noise of its
+force-torque sensor.
+"""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class SimulatedDemonstration:
-    """A demonstration and the truth behind it: shared by every method and level of a seed."""
+    """A demonstration and its true layout, shared by all methods and noise levels of a seed."""
 
     layout: Layout
     demonstration: Demonstration
     images: DemonstrationImages | None = None
-    """What the range finder measured of it; None if only poses are asked for."""
+    """Images of the depth camera; None if the pose source is a noise model."""
 
 
 @final
@@ -64,7 +67,7 @@ class Attempt:
 
 
 def stream(seed: int, which: int, secret_seed: SecretSeed | None = None) -> np.random.Generator:
-    """The random numbers of one stage of one trial; the key has only seed, stage and secret seed."""
+    """The random generator of one stage of one trial, keyed by seed, stage and secret seed only."""
     return np.random.default_rng(stream_key(seed, which, secret_seed))
 
 
@@ -76,7 +79,7 @@ def stream_key(seed: int, which: int, secret_seed: SecretSeed | None = None) -> 
 def simulate_demonstration(
     scene: Scene, human_error_scale: float, seed: int, pose_source: str = "noise", secret_seed: SecretSeed | None = None
 ) -> SimulatedDemonstration:
-    """Draw the truth of a trial and let the human demonstrate it; a depth camera takes images of that."""
+    """Draw the layout of a trial and simulate the demonstration on it; `depth-camera` as pose source records images."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, secret_seed), scene.clearance_mm)
     rng = stream(seed, DEMONSTRATION, secret_seed)
     if pose_source != DEPTH_CAMERA:
@@ -92,7 +95,7 @@ def simulate_demonstration(
 
 
 def demonstration_of(settings: TrialConfig, scene: Scene) -> SimulatedDemonstration:
-    """The demonstration of a trial.
+    """Simulate the demonstration of a trial.
 
     Args:
         scene: As compiled for these settings.
@@ -110,17 +113,22 @@ def watch_again(
     secret_seed: SecretSeed | None,
     watch: Any,
 ) -> None:
-    """Let the human demonstrate once more, the same, before somebody who looks on."""
+    """Simulate the same demonstration once more, with a callback `watch` that records it."""
     demonstrate(scene, simulated.layout, human_error_scale, stream(seed, DEMONSTRATION, secret_seed), watch)
 
 
 def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: float) -> RangeSensor:
-    """The range finder that watched a demonstration, as a noise model; `noise_mm` is the noise of a ray."""
+    """The depth camera that recorded a demonstration, as a noise model.
+
+    Args:
+        noise_mm: Noise of a ray, 1 sigma.
+    """
     from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.rays import ModelRays
 
     assert simulated.images is not None, "simulate the demonstration with pose_source='depth-camera'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
+    # nominal rotations at the mean yaw of the site
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.nominal_poses[:, :3, :3]
     return RangeSensor(simulated.images.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
 
@@ -128,7 +136,7 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: floa
 def observe_demonstration(
     simulated: SimulatedDemonstration, noise: Noise, seed: int, secret_seed: SecretSeed | None = None
 ) -> Observation:
-    """What a noise model makes of the demonstration of a trial."""
+    """Observe the demonstration of a trial with a noise model."""
     return observe(simulated.demonstration, noise, stream(seed, OBSERVATION, secret_seed))
 
 
@@ -140,9 +148,10 @@ def reobservations_of(
     secret_seed: SecretSeed | None = None,
     assembly: Assembly | None = None,
 ) -> Reobservations:
-    """Looks at the demonstration of a trial that was observed once.
+    """Further observations of a demonstration that was observed once.
 
     Args:
+        allowed: Their largest number.
         assembly: As in `Reobservations`.
     """
     first = stream(seed, OBSERVATION, secret_seed)
@@ -152,25 +161,25 @@ def reobservations_of(
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:
-    """Why a demonstration that is not right itself is not replayed."""
+    """The ending of a trial whose demonstration failed, so that it is not replayed."""
     why = f": {demonstration.why}" if demonstration.why else ""
     return Outcome("demonstrate", demonstration.code, None, describe_outcome(demonstration.code) + why)
 
 
 def observation_failure(observation: Observation) -> Outcome | None:
-    """Why an observation cannot be replayed as it is: an operation was not seen. None if all were."""
+    """The ending of a trial in which an operation was not observed, so there are no poses to plan with; else None."""
     if observation.observed.all():
         return None
-    k = int(np.argmin(observation.observed))
+    k = int(np.argmin(observation.observed))  # the first operation that was not observed
     return Outcome("observe", "not_seen", k, describe_outcome("not_seen", operation=k))
 
 
 def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> FailurePrediction:
-    """What plan and arm say before it is carried out, as it stands in a record: operations from 1, mm.
+    """The failure prediction of a plan with the arm of the scene, as in a record: operations from 1, mm.
 
     Args:
-        plan: With the contacts that the planner was given; which are the true ones is not known here.
-        searches: As in `replay_and_judge`.
+        plan: With the contacts that the planner was given; the true ones are not known here.
+        spiral: The robot searches for holes in a spiral.
     """
     arm = arm_moves(plan, scene, spiral)
     prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, arm)
@@ -185,7 +194,7 @@ def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> Failure
 
 
 def draw_robot_error(name: str, scene: Scene, seed: int, secret_seed: SecretSeed | None = None) -> RobotError | None:
-    """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
+    """Draw the robot errors of a trial, in proportion to their standard deviations; None for a robot without errors.
 
     Args:
         name: As in a record.
@@ -196,14 +205,14 @@ def draw_robot_error(name: str, scene: Scene, seed: int, secret_seed: SecretSeed
 
 
 def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...]], Array]) -> RobotError:
-    """What is wrong with a robot.
+    """Scale standard normal numbers to robot errors.
 
-    The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
-    the tip, and turns about their normal, the first.
+    The base is rotated about the mean of the nominal target poses. A part slips along the pads (second and third axis
+    of the tip) and rotates about their normal (first axis).
 
     Args:
-        name: As in a record.
-        drawn: Draws so many standard normal numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
+        name: Standard deviations, as in a record.
+        drawn: (stream, shape) -> standard normal numbers; streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
     """
     sigmas = parse_robot_error(name)
     shift, turn = drawn(HAND_EYE, (2, 3))
@@ -230,11 +239,11 @@ def replay_and_judge(
     config: ExecutionConfig = DEFAULT_EXECUTION,
     cache: ReplayCache | None = None,
 ) -> Attempt:
-    """Replay a plan and judge what was reached.
+    """Replay a plan and judge the result.
 
     Args:
-        reference: (n, 4, 4) goals that are right, world frame, [m]; the judge takes from them how
-            faces should overlap, how far apart they may be, and which of the symmetries of a part is meant.
+        reference: (n, 4, 4) right target poses, world frame, [m]; the judge takes from them how faces should overlap,
+            how far apart they may be, and which of the symmetries of a part is meant.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         config: How the robot executes the plan.
         cache: As in `replay`.
@@ -244,7 +253,7 @@ def replay_and_judge(
 
 
 def trial_outcome(attempt: Attempt) -> Outcome:
-    """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
+    """The outcome of a trial: success by the judge; otherwise the failure that the robot reported, else the judge's."""
     if attempt.verdict.success:
         return Outcome("done", "ok", None, describe_outcome("ok"))
     if attempt.result.outcome.failed:
@@ -255,13 +264,14 @@ def trial_outcome(attempt: Attempt) -> Outcome:
 
 
 _SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
+"""Settings that change the compiled scene."""
 
 
 def scene_of(settings: TrialConfig, scenario: Scenario | None = None) -> Scene:
     """Compile the scene of a trial.
 
     Args:
-        scenario: That of the settings, if it is loaded already.
+        scenario: The scenario of the settings, if already loaded.
 
     Raises:
         InputError: There is no such scenario or arm, or a part cannot have the clearance.
@@ -271,5 +281,5 @@ def scene_of(settings: TrialConfig, scenario: Scenario | None = None) -> Scene:
 
 
 def scene_key(settings: TrialConfig) -> tuple[Any, ...]:
-    """Equal where the same scene serves."""
+    """A key that is equal for settings with the same scene."""
     return (settings.scenario, *(getattr(settings, name) for name in _SHAPING))

@@ -1,1 +1,1 @@
-"""Pictures and words about one plan, one part, one noise model."""
+"""Pictures, tables and JSON objects of plans, corrections, robots and noise models."""

@@ -1,4 +1,4 @@
-"""A picture of an arm at the table."""
+"""A PNG picture of a robot arm at the table of a scenario."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import aim_camera, build_scene
 from apo_bench.simulation.scene.render import picture_with_arm
 
-_SIZE = (960, 720)
-_MIDDLE_M = np.array([-0.15, 0.0, 0.3])
-_DISTANCE_M = 1.9
+_SIZE = (960, 720)  # width and height, in pixels
+_MIDDLE_M = np.array([-0.15, 0.0, 0.3])  # the point that the camera looks at, world
+_DISTANCE_M = 1.9  # from the camera to that point
 _AZIMUTH_DEG = 140.0
 _ELEVATION_DEG = -18.0
 

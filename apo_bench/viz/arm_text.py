@@ -1,4 +1,4 @@
-"""What an arm can do, as one line and as one JSON object."""
+"""The properties and check results of an arm, as one line and as one JSON object."""
 
 from dataclasses import asdict
 from typing import Any
@@ -10,16 +10,17 @@ from apo_bench.simulation.arms.arm import Arm
 
 
 def describe_arm(arm: Arm) -> str:
-    """`6 joints, opens 85.6 mm, 44 N a pad, payload 5 kg; position servos made from the model`."""
+    """Describe an arm: `6 joints, opens 85.6 mm, 44 N a pad, payload 5 kg; position servos made from the model`."""
     hand = f", {arm.hand.force_n:.0f} N a pad" if arm.hand is not None else ""
+    # opening_m is the opening of each finger
     payload = f", payload {arm.limits.payload_kg:g} kg" if arm.limits.payload_kg is not None else ""
     return f"{len(arm.joints)} joints, opens {2e3 * arm.opening_m:.1f} mm{hand}{payload}; {arm.control}"
 
 
 def arm_check_form(check: ArmCheck) -> dict[str, Any]:
-    """The JSON object of everything that was measured; last what is missing."""
+    """Return everything that the check measured as a JSON object; `missing` lists what the arm lacks."""
     arm = check.arm
-    reached = check.reached[:, 2] == 1.0
+    reached = check.reached[:, 2] == 1.0  # places of the table that the arm reaches at every turn of the tip
     margins = (float(x) if np.isfinite(x) else "no limit" for x in check.margins_deg)
     return {
         "arm": describe_arm(arm),

@@ -1,4 +1,4 @@
-"""A correction as lines, as tables, and as one JSON object."""
+"""A correction as lines of text, rows of tables, and one JSON object."""
 
 from typing import Any
 
@@ -12,10 +12,10 @@ from apo_bench.viz.dof_text import dof_form, hypothesis_forms, hypothesis_lines
 from apo_bench.viz.form_text import fact_lines
 
 _SCHEMA = "apo-bench/correction/1"
-_TOO_GOOD = 1e-6  # with the stated noise no p-value is nearer to 1 ...
-_TESTED = 3  # ... if the test has at least so many degrees of freedom
+_TOO_GOOD = 1e-6  # a p-value above 1 - _TOO_GOOD shows that the stated noise is far too large ...
+_TESTED = 3  # ... if the test has at least this many degrees of freedom
 _TABLES = ("schema", "operations", "test", "test_after", "hypotheses", "explanation")
-"""Keys of a form that are not lines."""
+"""Keys of a form that are tables or objects, not lines."""
 POSE_COLUMNS = {
     "operation": "d",
     "part": "",
@@ -38,7 +38,7 @@ SUSPECT_COLUMNS = {
 
 
 def correction_lines(form: dict[str, Any], correction: Correction) -> list[tuple[str, str]]:
-    """Name and text of each line: the facts of `correction_form`, the test, the hypotheses."""
+    """Return name and text of each line: the facts of `correction_form`, the two tests, the hypotheses."""
     contradictory = correction.status == "inconsistent"
     more = {
         "test": _describe_test(correction.test, contradictory),
@@ -56,7 +56,15 @@ def correction_form(
     explanation: Explanation | None,
     assumed: bool,
 ) -> dict[str, Any]:
-    """The JSON object: mm, degrees, wxyz, operations from 1; poses only of a correction that converged."""
+    """Return a correction as a JSON object: mm, degrees, quaternions wxyz, operations from 1.
+
+    Args:
+        explanation: Free and fixed directions of the corrected poses; None leaves these entries null.
+        assumed: Whether the standard deviations of the observation were assumed, not stated.
+
+    Returns:
+        The object; `operations` is null unless the correction converged.
+    """
     return {
         "schema": _SCHEMA,
         "scenario": scenario,
@@ -79,6 +87,7 @@ def correction_form(
 
 
 def _describe_test(test: Consistency | None, contradictory: bool) -> str | None:
+    """Describe a test and its verdict in words; None without a test."""
     if test is None:
         return None
     names = [suspect.relation for suspect in test.ambiguous]
@@ -94,7 +103,7 @@ def _describe_test(test: Consistency | None, contradictory: bool) -> str | None:
 
 
 def _operation_forms(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
-    # D = observed^-1 corrected: its log ends with the turn, whose size is an angle
+    # D = observed^-1 corrected; the last three numbers of its log are a rotation vector, whose norm is the angle
     D = pose.inverse(observation.poses) @ correction.poses
     moved_mm = np.linalg.norm(D[:, :3, 3], axis=-1) * 1e3
     turned_deg = np.degrees(np.linalg.norm(pose.log(D)[:, 3:], axis=-1))
@@ -112,6 +121,7 @@ def _operation_forms(observation: Observation, correction: Correction) -> list[d
 
 
 def _test_form(test: Consistency | None) -> dict[str, Any] | None:
+    """Return a consistency test as a JSON object; None without a test."""
     return test and {
         "chi_square": _finite(test.chi_square),
         "freedom": test.freedom,
@@ -133,5 +143,5 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
 
 
 def _finite(x: float) -> float | None:
-    """A number that JSON has; it has no infinity."""
+    """Return a finite number, or None, since JSON has no infinity."""
     return float(x) if np.isfinite(x) else None

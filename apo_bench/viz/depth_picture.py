@@ -1,4 +1,4 @@
-"""A picture of what a depth camera estimates from a demonstration: a row for each change that it finds."""
+"""A picture of the poses that a depth camera estimates from a demonstration: one row per detected change."""
 
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,21 @@ from apo_bench.perception.depth_camera.range_finder import VIEWS
 from apo_bench.viz.depth_run import DepthRun
 
 _TITLES = ("camera image", "depth [m]", "minus the depth before [mm]", "appeared, vanished", "fitted model")
-_APPEARED = "#1b7837"
-_VANISHED = "#b2182b"
-_OUTLINE = "#d95f02"
-_AROUND = 20  # pixels around the changes
-_LARGEST_MM = 60.0
+_APPEARED = "#1b7837"  # colour of pixels where something appeared
+_VANISHED = "#b2182b"  # colour of pixels where something vanished
+_OUTLINE = "#d95f02"  # colour of the outline of the fitted model
+_AROUND = 20  # margin around the changed pixels, in pixels
+_LARGEST_MM = 60.0  # end of the colour scale of depth differences
 
 
 @use_figure_style()
 def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
-    """Draw every change in one view of the depth camera, counted from 0."""
+    """Draw every detected change in one view of the depth camera.
+
+    Args:
+        out: PNG file to write.
+        view: Number of the view, from 0.
+    """
     from matplotlib.figure import Figure
 
     rows = max(1, len(run.events))
@@ -31,7 +36,7 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     for row, event in zip(grid, run.events, strict=False):
         row[0].set_ylabel(_describe(event), fontsize=9)
         _draw_row(row, run, event, view)
-    # the pictures show the pixels that ever changed, and some around
+    # every picture is cropped to the pixels that changed in any event, with a margin
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in run.events]
     if np.any(changed):
         v, u = np.nonzero(np.any(changed, axis=0))
@@ -41,6 +46,7 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
 
 
 def _describe(event: Event) -> str:
+    """Return the label of an event: `3: cube, 97 % explained`."""
     moved = ", ".join(sorted(event.moved)) or "nothing"
     if event.operation is None:
         return f"{moved}: unexpected"
@@ -49,11 +55,12 @@ def _describe(event: Event) -> str:
 
 
 def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
+    """Draw the five pictures of `_TITLES` for one event into a row of axes."""
     from matplotlib.colors import ListedColormap
 
     after = run.images[event.last][view]
     change = 1e3 * (after - run.images[event.first][view])
-    regions = event.regions[view]
+    regions = event.regions[view]  # masks of the pixels that appeared or vanished
     low = np.nanmin(after)
     row[0].imshow(run.watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
     row[1].imshow(after, cmap="viridis_r", vmin=low, vmax=np.nanquantile(after, 0.95))
@@ -63,6 +70,7 @@ def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
     for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
         row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
     if event.found is not None and event.model is not None:
+        # outline the pixels whose rays hit the model at the estimated pose
         camera = VIEWS[view]
         distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
         row[4].contour(np.isfinite(distance.reshape(after.shape)), levels=[0.5], colors=_OUTLINE, linewidths=1.2)

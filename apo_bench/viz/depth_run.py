@@ -1,4 +1,4 @@
-"""One demonstration through the depth camera, and the poses that it estimates, as one JSON object."""
+"""Estimate the poses of one demonstration by the depth camera, and return the result as one JSON object."""
 
 from typing import Any, NamedTuple
 
@@ -36,23 +36,30 @@ DEPTH_COLUMNS = {
 
 
 class DepthRun(NamedTuple):
-    """A demonstration, the images of it, and the events that the depth camera finds in them."""
+    """A demonstration, its images, and the events that the depth camera detects in them."""
 
     scenario: str
     simulated: SimulatedDemonstration
+    # camera pictures and their times
     watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured depth images, (views, height, width) each, [m]."""
     events: tuple[Event, ...]
     models: ModelRays
-    """The parts as the depth camera knows them."""
+    """Casts rays at models of the parts, which are smaller by the clearance as the real parts are."""
 
 
 def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scale: float) -> DepthRun:
-    """Demonstrate, and estimate the poses: the same images and poses as in a trial with these settings.
+    """Simulate a demonstration and estimate its poses: the same images and poses as in a trial with these settings.
+
+    Args:
+        scenario: Name or file.
+        noise_mm: Standard deviation of the depth per ray, [mm].
+        seed: Number of the trial.
+        human_error_scale: Factor on the human error of the scenario.
 
     Raises:
-        InputError: A setting that is not allowed.
+        InputError: A setting is not allowed.
         RuntimeError: The demonstration itself failed.
     """
     check("noise_mm", noise_mm)
@@ -70,9 +77,11 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
 
 
 def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
-    """The JSON object: operations from 1; the error is that of the depth camera, without the human's."""
+    """Return a run as a JSON object: operations from 1, errors of the depth camera without those of the human."""
     operations = []
-    events = {event.operation: event for event in run.events}
+    events = {
+        event.operation: event for event in run.events
+    }  # unexpected events have operation None and are not looked up
     for k, operation in enumerate(run.simulated.demonstration.assembly.operations):
         event = events.get(k)
         form = {"operation": k + 1, "moves": list(operation.moves), "found": False}
@@ -89,6 +98,7 @@ def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: flo
 
 
 def _estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
+    """Return the estimated pose of operation k, (x, y, z [mm], qw, qx, qy, qz), its deviations and its true error."""
     found = event.found
     deviation = np.sqrt(np.diag(found.covariance))
     error = pose.log(pose.inverse(found.T) @ run.simulated.demonstration.poses[k])

@@ -1,4 +1,4 @@
-"""Detected contacts as one JSON object."""
+"""Detected contacts, compared with those of the scenario, as one JSON object."""
 
 from math import degrees
 from typing import Any
@@ -26,10 +26,20 @@ CONTACT_COLUMNS = {
 def detection_form(
     scenario: str, contact_source: str, observation: Observation, detected: DetectedContacts, assumed: bool
 ) -> dict[str, Any]:
-    """The JSON object: mm and degrees, operations from 1."""
+    """Return detected contacts as a JSON object: mm and degrees, operations from 1.
+
+    Args:
+        contact_source: Name of the detection, as in `--contact-source`.
+        assumed: Whether the standard deviations of the observation were assumed, not stated.
+
+    Returns:
+        The object; `missed` lists contacts of the scenario that were not detected, and `next` describes the second most
+        probable set of contacts.
+    """
     right = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
     found = {(each.made, each.contact) for each in detected.evidence}
     rival = detected.rival
+    # contacts by name, of the most probable set and of the next one
     mine = _name_contacts(detected.assembly)
     others = mine if rival is None else _name_contacts(rival.assembly)
     return {
@@ -60,7 +70,7 @@ def detection_form(
 
 
 def _name_contacts(assembly: Assembly) -> set[str]:
-    """`5: cube.px on castle2.nx` of each contact."""
+    """Return `5: cube.px on castle2.nx` for each contact; the number is that of the operation, from 1."""
     return {f"{relation.made + 1}: {relation.contact}" for relation in assembly.relations()}
 
 
@@ -69,5 +79,5 @@ def _contact_form(operation: int, contact: Contact) -> dict[str, Any]:
 
 
 def _to_mm(metres: float) -> float:
-    """Rounded, and never -0."""
+    """Convert to mm, rounded; adding 0.0 turns -0.0 into 0.0."""
     return round(1e3 * metres, 6) + 0.0

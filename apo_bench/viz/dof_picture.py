@@ -1,4 +1,4 @@
-"""The free directions of every part, drawn as arrows on the finished assembly."""
+"""A picture of the finished assembly with arrows along the directions in which each part is still free."""
 
 from pathlib import Path
 from typing import Any
@@ -24,24 +24,24 @@ from apo_bench.simulation.scene import (
 from apo_bench.viz.dof_text import format_deviation
 from apo_bench.viz.panels import Color, Panel, PanelLine, draw_panels
 
-_SIZE = (900, 540)
+_SIZE = (900, 540)  # width and height, in pixels
 _ARROW_M = 0.038  # length of an arrow
-_AWAY_M = 0.006  # from a part to its arrows
-_GRAY = (0.45, 0.45, 0.45)
-_AZIMUTH_DEG = 230.0
+_AWAY_M = 0.006  # gap between a part and its arrows
+_GRAY = (0.45, 0.45, 0.45)  # colour of parts for which the scenario states none
+_AZIMUTH_DEG = 230.0  # of the camera, relative to the x axis of the first part
 _ELEVATION_DEG = -33.0
 _LOW = 0.3  # height of a ring on its part, as a share of the part's length along the axis
-_SHADE = 0.8  # an arrow has so much of the brightness of its part
+_SHADE = 0.8  # brightness of an arrow relative to the colour of its part
 
 
 @use_figure_style()
 def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
-    """Write a PNG picture, with a sentence for each part below.
+    """Write a PNG picture, with a sentence for each part below it.
 
     Raises:
-        InputError: Nothing here can draw, or the file cannot be written.
+        InputError: This machine cannot render, or the file cannot be written.
     """
-    own = {operation.part: operation for operation in explanation.operations}
+    own = {operation.part: operation for operation in explanation.operations}  # the last operation of each part
     poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
     first = explanation.poses[0]
     azimuth = float(np.degrees(np.arctan2(first[1, 0], first[0, 0]))) + _AZIMUTH_DEG
@@ -70,10 +70,12 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
 
 
 def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Array) -> Any:
-    """Arrows outside the part; of a turn a ring about its point, or about the middle where any point will do.
+    """Return the mark of a free direction: arrows outside the part for a shift, a ring for a turn.
 
     Args:
-        T: Pose of the part, (4, 4), world.
+        T: Pose of the part, (4, 4), world, [m].
+        direction: A shift or a turn, in the frame of the part.
+        toward: Horizontal unit vector towards the camera, (3,), world.
     """
     R = T[:3, :3]
     at = T[:3, 3]
@@ -82,23 +84,24 @@ def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Ar
     low, high = measure_extent(solid.pieces, direction.axis)
     if not direction.turns:
         middle = solid.bounds.mean(axis=0)
-        reach = high - direction.axis @ middle + _AWAY_M
+        reach = high - direction.axis @ middle + _AWAY_M  # from the middle of the part to the tail of the arrow
         return ShiftArrows(R @ middle + at, axis, reach, reach + _ARROW_M, (r, g, b), str(direction))
-    # on the axis of the turn, at a part of the way from the lower end of the solid along it
+    # the centre of the ring: on the axis of the turn, at the share _LOW of the part's extent along it
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
-    # two unit vectors at right angles to the axis: rows of V^T that belong to no singular value
+    # two unit vectors perpendicular to the axis: the rows of V^T that span its null space
     across = np.linalg.svd(direction.axis[None])[2][1:]
     ends = np.array([measure_extent(solid.pieces, v) for v in across]) - (across @ about)[:, None]
+    # outside the corner of the bounding box around the axis
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
     return TurnRing(R @ about + at, axis, toward, radius, (r, g, b), str(direction))
 
 
 def _write_name(axes: Any, mark: Any, tips: Array) -> None:
-    """Write the name of a mark at the lowest of the places, (k, 2), where it may stand."""
+    """Write the name of a mark at the lowest of its tips, (k, 2), pixels; the rightmost of equally low ones."""
     from matplotlib.patheffects import withStroke
 
     x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
-    white = [withStroke(linewidth=3.5, foreground="white")]
+    white = [withStroke(linewidth=3.5, foreground="white")]  # outline that keeps the letters legible
     look = {"color": tuple(0.75 * c for c in mark.color), "fontsize": 13, "weight": "bold", "path_effects": white}
     axes.text(x, y, mark.name, ha="center", va="center", **look)
 

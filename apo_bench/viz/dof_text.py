@@ -1,4 +1,4 @@
-"""What the contacts determine, as sentences, as a table, and as one JSON object."""
+"""The directions that contacts fix and leave free, as sentences, as a table, and as one JSON object."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,22 +20,26 @@ PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "devi
 
 
 def count_directions(explanation: Explanation) -> str:
-    """`the contacts fix 13 of 18 directions; 5 are free and 14 of 27 equations redundant`."""
+    """Count directions: `the contacts fix 13 of 18 directions; 5 are free and 14 of 27 equations redundant`."""
     redundant = f"{explanation.redundant} of {explanation.rank + explanation.redundant} equations redundant"
     fixed = f"{explanation.rank} of {6 * len(explanation.poses)} directions"
     return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
 def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
-    """What is fixed and free of each operation, one object each, for a table with `DOF_COLUMNS`."""
+    """Return one table row per operation with its fixed and free directions, for columns `DOF_COLUMNS`."""
     rows = []
     for o in explanation.operations:
         free = []
-        for along, some in group_by((direction.along, direction) for direction in o.free).items():
+        for along, some in group_by(
+            (direction.along, direction) for direction in o.free
+        ).items():  # shared directions are grouped by the operations that move along
             names = ", ".join(f"{each.direction} {format_deviation(each)}" for each in some)
             others = dict.fromkeys(explanation.operations[j].part for j in along)
             free.append(f"{names}{' with ' * bool(others)}{', '.join(others)}")
-        until = {hold.relation: "" if hold.lost is None else f" until {hold.lost + 1}" for hold in o.through}
+        until = {
+            hold.relation: "" if hold.lost is None else f" until {hold.lost + 1}" for hold in o.through
+        }  # a relation that is lost later holds `until` that operation
         rows.append(
             {
                 "operation": o.operation + 1,
@@ -50,7 +54,7 @@ def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
 
 
 def shared_lines(explanation: Explanation) -> list[str]:
-    """`camera: off by (-0.30 ± 0.50, 1.90 ± 0.30, 0.10 ± 0.40) mm and (..) deg`, for each shared error."""
+    """Return a line for each shared error: `camera: off by (-0.30 ± 0.50, ...) mm and (..) deg`."""
     lines = []
     for estimate in explanation.shared:
         numbers = zip(estimate.twist * TO_MM_DEG, estimate.deviations * TO_MM_DEG, strict=True)
@@ -60,18 +64,18 @@ def shared_lines(explanation: Explanation) -> list[str]:
 
 
 def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
-    """`0.92: without the observation of operation 2`, one each, if there is more than one."""
+    """Return a line for each hypothesis, `0.92: without the observation of operation 2`; none if there is only one."""
     lines = [f"{each.weight:.2g}: {each.sentence or 'as observed'}" for each in hypotheses]
     return lines if len(lines) > 1 else []
 
 
 def format_deviation(free: FreeDirection) -> str:
-    """`1.00 mm` or `0.58 deg`."""
+    """Return the standard deviation along a free direction: `1.00 mm` or `0.58 deg`."""
     return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
 
 
 def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
-    """The JSON object: mm, degrees, operations from 1; a spectral gap of null is infinite."""
+    """Return an explanation as a JSON object: mm, degrees, operations from 1; an infinite spectral gap is null."""
     return {
         "schema": _SCHEMA,
         "scenario": scenario,
@@ -121,7 +125,7 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
 
 
 def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
-    """The hypotheses as JSON objects: operations from 1, poses and covariances in mm and degrees."""
+    """Return hypotheses as JSON objects: operations from 1, poses and covariances in mm and degrees."""
     return [
         {
             "weight": each.weight,
@@ -136,11 +140,19 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
 
 
 def _deviation(free: FreeDirection) -> float:
+    # the first three entries of TO_MM_DEG convert to mm, the last three to degrees
     return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
 
 
 def _free_form(free: FreeDirection, T: Array) -> dict[str, Any]:
-    """A twist per mm of a shift or per degree of a turn; its axis in the frame of the part and in the world."""
+    """Return a free direction as a JSON object.
+
+    Args:
+        T: Pose of the part, (4, 4), world, [m].
+
+    Returns:
+        The object; its twist is per mm of a shift or per degree of a turn, in the frame of the part.
+    """
     d = free.direction
     return {
         "name": str(d),

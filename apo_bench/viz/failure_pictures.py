@@ -1,4 +1,4 @@
-"""Pictures of a sample of trials that failed: the parts where their records say that they ended."""
+"""Pictures of some failed trials: the parts at the poses where the record says that they ended."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -17,13 +17,13 @@ from apo_bench.records import TrialConfig, TrialRecord, get_record_key, restore_
 from apo_bench.records.run.replay_command import Files
 from apo_bench.records.run.validation import record_of
 
-_SIZE = (640, 480)
-_QUALITY = 82
+_SIZE = (640, 480)  # width and height, in pixels
+_QUALITY = 82  # of the JPEG file
 _AZIMUTH_DEG = 128.0
 _ELEVATION_DEG = -24.0
-_ARROW_M = 0.11  # how far from its contact an arrow begins
-_TIP_M = 0.012  # and ends
-_ARROW = (0.85, 0.1, 0.1)
+_ARROW_M = 0.11  # from the contact to the tail of the arrow
+_TIP_M = 0.012  # from the contact to the head of the arrow
+_ARROW = (0.85, 0.1, 0.1)  # colour of the arrow
 
 
 def failure_pictures(
@@ -32,11 +32,12 @@ def failure_pictures(
     """Draw failed trials.
 
     Args:
-        folder: Of the sweep, whose records say where parts ended.
+        chosen: Records of the trials to draw.
+        folder: Folder of the sweep; its `trials.jsonl` holds the final poses.
         files: Scenario -> its file.
 
     Returns:
-        The pictures that could be made, and sentences on those that could not.
+        The pictures, and one sentence for each distinct reason why a picture could not be made.
     """
     pictures: list[FailurePicture] = []
     missed: list[str] = []
@@ -45,7 +46,7 @@ def failure_pictures(
             pictures.append(_draw_failure(record, folder, files))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
-            if "no picture can be drawn here" in missed[-1]:
+            if "no picture can be drawn here" in missed[-1]:  # this machine cannot render, so no other picture will do
                 break
     return pictures, list(dict.fromkeys(missed))
 
@@ -59,7 +60,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePic
 
     name = record["scenario"]
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
-    # the arm is not in the picture, and may be code that the record names
+    # the picture shows no arm, and the arm of the record may be a plugin that must not be run here
     scene = scene_of(replace(restore_settings(record, files.get(name, name)), arm=TrialConfig.arm))
     poses = _read_poses(_whole_record(folder, record).get("reached"))
     require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
@@ -70,7 +71,8 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePic
 
 
 def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
-    """The record as it is in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
+    """Return the complete line of `trials.jsonl` for a record that a report has shortened; empty if not found."""
+    # a cheap search in the text of each line, before any line is parsed
     wanted = (f'"seed": {record["seed"]},'.encode(), json.dumps(record["config_hash"]).encode())
     path = folder / "trials.jsonl"
     for number, line in read_lines(path, "table of trials"):
@@ -82,11 +84,11 @@ def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
 
 
 def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
-    """The contact that the sentence of a failure names; else the first one of an operation that a force stopped."""
+    """Return the contact that the failure sentence names, else the first contact of an operation with a force stop."""
     operations = scene.scenario.assembly.operations
     sentence = f"{record.get('sentence') or ''} "
     k = record.get("failure_operation")
-    # with a space behind it, so that `a.px on b.n` is not found in `a.px on b.nx`
+    # the space prevents `a.px on b.n` from matching `a.px on b.nx`
     named = [contact for operation in operations for contact in operation.contacts if f"{contact} " in sentence]
     if k and record["failure_code"] == "force_stop":
         named += operations[k - 1].contacts
@@ -94,7 +96,10 @@ def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
 
 
 def _mark(contact: Contact | None, scene: Any, poses: Poses) -> Any:
-    """An arrow from above to the middle of the face that makes the contact; of a fixed part, to the face upon it."""
+    """Return an arrow that points down at the middle of the environment's face, or None.
+
+    If the environment is a fixed part, the arrow points at the face of the manipulated part, since fixed faces are large.
+    """
     from apo_bench.simulation.scene.marks import Marks, ShiftArrows
 
     if contact is None or any(of.part not in poses for of in contact):
@@ -106,18 +111,18 @@ def _mark(contact: Contact | None, scene: Any, poses: Poses) -> Any:
 
 
 def _read_poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
-    """Part -> (4, 4), world frame, [m], from the mm of a record."""
+    """Return part -> pose, (4, 4), world, [m], from positions in mm and quaternions of a record."""
     return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in (reached or {}).items()}
 
 
 def _camera(scene: Any, record: TrialRecord, poses: Poses) -> Any:
-    """A view of the parts of the operation that failed, else of all that were assembled."""
+    """Aim the camera at the parts of the operation that failed, else at all parts that are not fixed."""
     from apo_bench.simulation.film.framing import frame_parts
     from apo_bench.simulation.scene.render import aim_camera
 
     assembly = scene.scenario.assembly
     k = record.get("failure_operation")
-    failed = assembly.operations if k is None else assembly.operations[k - 1 : k]
+    failed = assembly.operations if k is None else assembly.operations[k - 1 : k]  # operations of records count from 1
     near = {part for o in failed for part in (*o.moves, *(contact.environment.part for contact in o.contacts))}
     shown = (near & poses.keys()) - assembly.fixed or poses.keys() - assembly.fixed
     return aim_camera(*frame_parts(assembly, [poses], shown), _AZIMUTH_DEG, _ELEVATION_DEG)

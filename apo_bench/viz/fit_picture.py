@@ -1,4 +1,4 @@
-"""How well fitted noise fits: histograms with the fitted densities, and quantiles against quantiles."""
+"""A picture of how well a fitted noise model agrees with residuals: histograms and quantile-quantile plots."""
 
 import textwrap
 from collections.abc import Callable
@@ -14,13 +14,16 @@ from apo_bench.perception.observation.models import MeasuredNoise, Residuals
 _OBSERVED = "#9fb8d1"
 _FITTED = "#a6341b"
 _BINS = 40
-_LETTERS = 120  # in a line of the title
+_LETTERS = 120  # most letters in a line of the title
 _SHOWN = 0.995  # quantile up to which a histogram is drawn
 
 
 @use_figure_style()
 def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
-    """Write a PNG picture: across the ray, along it, turns; above, histograms; below, quantiles."""
+    """Write a PNG picture with a column each for errors across the ray, along the ray, and of rotation.
+
+    The upper row has histograms with fitted densities, the lower row observed against fitted quantiles.
+    """
     from matplotlib.figure import Figure
 
     upright = residuals.upright
@@ -46,20 +49,21 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
 
 
 def _draw_histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+    # the cut tail may be long, but the axis has a width even if all sizes are 0
     top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
-    # a density of all sizes, also of those beyond the last bin: each counts 1 / (n * width of a bin)
+    # a bar of m sizes has height m / (n * bin width); n counts the sizes beyond the last bin too
     weights = np.full(len(sizes), _BINS / (top * len(sizes)))
     axis.hist(sizes, np.linspace(0.0, top, _BINS + 1), weights=weights, color=_OBSERVED, label="observed")
-    # the fitted density is the slope of its distribution
+    # the fitted density is the numerical derivative of the fitted distribution
     fine = np.linspace(0.0, top, 401)
     axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=_FITTED, label="fitted")
     axis.set(xlim=(0.0, top), xlabel=name)
 
 
 def _draw_quantiles(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
-    """Every observed size against the fitted one at its rank; on the line they are equal."""
+    """Plot observed quantiles against fitted quantiles; points on the diagonal agree."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
-    # the i-th of n sizes has the share (i - 1/2) / n below it; the fitted size with that share is read off backwards
+    # of n sizes the i-th has the cumulative probability (i - 1/2) / n; interpolation inverts the fitted distribution
     rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
     fitted = np.interp(rank, np.maximum.accumulate(cdf(grid)), grid)
     axis.plot([0.0, limit], [0.0, limit], color=_FITTED, linewidth=1.0)

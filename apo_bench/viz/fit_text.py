@@ -12,17 +12,17 @@ from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, R
 from apo_bench.viz.form_text import fact_lines
 
 _SCHEMA = "apo-bench/noise-fit/2"
-_RARE = 0.01
+_RARE = 0.01  # a turned part whose shift has a smaller tail probability than this is counted as off as well
 _NOTED = ("parts", "images", "distance_mm", "found", "left_over", "turned", "turned_and_off", "round_objects")
 """Keys of a form that the notes of a noise file state."""
 
 
 def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
-    """The JSON object of all counts and fits: mm and degrees; degrees of freedom are null for a Gaussian."""
+    """Return counts and fits as a JSON object: mm and degrees; degrees of freedom are null for a Gaussian."""
     inlier = residuals.inlier
-    turned = inlier & ~residuals.upright
+    turned = inlier & ~residuals.upright  # inliers with a rotation error beyond TURNED_DEG
     shift = residuals.shift_mm[residuals.upright]
-    across = max(float(np.median(residuals.across_mm[inlier])), 1e-9)
+    across = max(float(np.median(residuals.across_mm[inlier])), 1e-9)  # never 0, since it is a divisor below
     return {
         "schema": _SCHEMA,
         "source": measured.source,
@@ -64,7 +64,7 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 
 
 def fit_lines(form: Mapping[str, Any]) -> list[str]:
-    """A form of `fit_form` as lines."""
+    """Format a form of `fit_form` as lines: facts, a table of percentiles, and the goodness of fit."""
     inliers = [key for key in form if key.startswith("inlier_")]
     facts = fact_lines(form, ("schema", "percentiles", "fit", *inliers))
     table = [("", "", *(f"p{p}" for p in form["percentiles"]))]
@@ -75,7 +75,7 @@ def fit_lines(form: Mapping[str, Any]) -> list[str]:
 
 
 def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
-    """What a reader of the noise file should know of the fit, one line each."""
+    """Return the notes that a noise file states about its fit, one line each."""
     return (
         "Level 1 is as measured: mm and degrees, Student t, none beyond the limit.",
         f"Inliers that are turned by more than {TURNED_DEG:g} deg are not fitted: symmetries are not known.",
@@ -85,6 +85,7 @@ def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
+    """Return the Kolmogorov-Smirnov distance of each fit, with the distance that chance exceeds rarely."""
     return [
         f"{name}: Kolmogorov-Smirnov {of['kolmogorov_smirnov']:.3f}, by chance below "
         f"{of['kolmogorov_smirnov_by_chance']:.3f}"

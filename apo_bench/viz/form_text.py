@@ -1,4 +1,4 @@
-"""JSON objects as text: lines of name and value, and tables on the terminal."""
+"""Format JSON objects as text: lines of name and value, and tables on the terminal."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -7,13 +7,13 @@ from rich.table import Table
 
 
 def fact_lines(form: Mapping[str, Any], without: Iterable[str] = ()) -> list[tuple[str, str]]:
-    """Name and text of every value that is known: neither null nor an empty list."""
+    """Return name and text of every value that is neither null nor an empty list, except the keys `without`."""
     known = {key: value for key, value in form.items() if key not in without and value is not None and value != []}
     return [(key.replace("_", " "), format_value(value)) for key, value in known.items()]
 
 
 def format_value(value: Any) -> str:
-    """Numbers with four digits, lists with commas, objects with their keys."""
+    """Format a value: floats with four significant digits, lists with commas, objects with their keys."""
     if isinstance(value, Mapping):
         return ", ".join(map(" ".join, fact_lines(value)))
     if isinstance(value, list | tuple):
@@ -22,12 +22,12 @@ def format_value(value: Any) -> str:
 
 
 def form_table(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) -> Table:
-    """A table of `rich` with a line for each object and its keys as heads.
+    """Return a `rich` table with one line per object; the columns are titled by keys.
 
     Args:
-        columns: Key -> format of its value, or of each value of a list or an object; a missing value is `-`.
+        columns: Key -> format specification of its value, or of each item of a list or object; a missing value is `-`.
     """
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)  # columns with a format hold numbers and are aligned right
     for key, how in columns.items():
         table.add_column(key.replace("_", " "), justify="right" if how else "left")
     for row in rows:
@@ -36,6 +36,7 @@ def form_table(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) ->
 
 
 def _format_cell(value: Any, how: str) -> str:
+    """Format a value, every item of a list, or every item of an object with its key."""
     if isinstance(value, dict):
         return ", ".join(f"{name} {each:{how}}" for name, each in value.items())
     values = value if isinstance(value, list) else [value]

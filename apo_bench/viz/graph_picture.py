@@ -1,4 +1,4 @@
-"""A picture of a relation graph, as Fig. 7: each part above the parts that it lies on, an arrow for each contact."""
+"""A picture of a relation graph, as Fig. 7: each part above the parts that support it, an arrow per contact."""
 
 from collections.abc import Mapping
 from graphlib import TopologicalSorter
@@ -10,28 +10,32 @@ from apo_bench.assembly import ArcResiduals, Graph, Node
 from apo_bench.io import save_figure, use_figure_style
 
 _INK = "#222222"
-_GONE = "#8A8A8A"
-_ALARM = "#C8102E"
-_GROUND = "#E4E4E4"
+_GONE = "#8A8A8A"  # contacts that disappeared, parts that moved on
+_ALARM = "#C8102E"  # residuals above the allowed gap
+_GROUND = "#E4E4E4"  # parts without a colour
 _PALE = 0.75  # share of white in the colour of a part
-_DASHES = (0, (4, 2.5))
-_DASH_DOTS = (0, (9, 2, 1.5, 2))
-_ROW_IN = 1.2  # from row to row
-_COLUMN_IN = 1.6  # from column to column
+_DASHES = (0, (4, 2.5))  # style of contacts that disappeared
+_DASH_DOTS = (0, (9, 2, 1.5, 2))  # style of contacts about an axis
+_ROW_IN = 1.2  # distance between rows
+_COLUMN_IN = 1.6  # distance between columns
 _BOX_IN = (1.3, 0.5)  # width and height of a box
-_BEND = 0.4  # of an arrow that passes a row
-_LABEL_AT = 0.4  # of the way from the upper to the lower box
+_BEND = 0.4  # curvature of an arrow that skips a row, so that it does not cross the box between
+_LABEL_AT = 0.4  # position of a label, as a share of the way from the upper to the lower box
 
 Place = tuple[float, float]
 
 
 def place_nodes(graph: Graph) -> dict[Node, Place]:
-    """Column and row of each part: one row above the highest part that it lies on, near the parts below it."""
+    """Return column and row of each node: one row above the highest node below it, near the mean column of those.
+
+    Rows count from 0 at the bottom; columns are centred at 0.
+    """
     below = {node: [arc.environment for arc in graph.arcs if arc.manipulated == node] for node in graph.nodes}
     sorter = TopologicalSorter(below)
     sorter.prepare()
     places: dict[Node, Place] = {}
     row = 0
+    # each pass takes the nodes all of whose supports are placed already
     while sorter.is_active():
         ready = sorter.get_ready()
         nodes = sorted(ready, key=lambda n: (fmean([places[m][0] for m in below[n]] or [0.0]), graph.nodes.index(n)))
@@ -51,11 +55,12 @@ def draw_graph(
     residuals: ArcResiduals = (),
     gap_m: float = 0.0,
 ) -> None:
-    """Write the picture as the suffix of `path` says.
+    """Write the picture in the format of the suffix of `path`.
 
     Args:
         colors: Part -> RGB in 0..1.
-        residuals: Of each arc, [m], written on it, in red if above `gap_m`; None where it is not known.
+        residuals: Residual of each arc, [m], written on the arc; None where it is unknown.
+        gap_m: Residuals above this are red.
     """
     from matplotlib.figure import Figure
 
@@ -83,13 +88,13 @@ def draw_graph(
 
 
 def _draw_arrow(axes: Any, upper: Place, lower: Place, color: str, style: Any, label: str) -> None:
-    """An arrow from the bottom of one box to the top of another, with a label."""
+    """Draw an arrow from the bottom of the upper box to the top of the lower box, with a label."""
     (x, y), (u, v) = upper, lower
     y, v = y - _BOX_IN[1] / 2, v + _BOX_IN[1] / 2
     bend = _BEND if y - v > _ROW_IN else 0.0
     look = {"arrowstyle": "-|>", "color": color, "linestyle": style, "connectionstyle": f"arc3,rad={bend}"}
     axes.annotate("", (u, v), (x, y), arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=1)
-    # the arc is a parabola: at a share s of its way it is 2 s (1 - s) rad of its length away from the straight line
+    # arc3 is a quadratic Bezier curve: at the share s it deviates by 2 s (1 - s) rad of its length from the chord
     s = _LABEL_AT
     aside = 2 * s * (1 - s) * bend
     at = (x + s * (u - x) - aside * (y - v), y + s * (v - y) - aside * (u - x))
@@ -98,8 +103,10 @@ def _draw_arrow(axes: Any, upper: Place, lower: Place, color: str, style: Any, l
 
 
 def _draw_node(axes: Any, node: Node, at: Place, face: Any, stands: bool) -> None:
-    """A box with name and ODL; dashed and white where the part has left."""
-    terms = (f"T_{{{k + 1}}}{'^{-1}' if inverse else ''}" for k, inverse in node.odl)
+    """Draw a box with the part's name and ODL; dashed and white if the part has moved on from there."""
+    terms = (
+        f"T_{{{k + 1}}}{'^{-1}' if inverse else ''}" for k, inverse in node.odl
+    )  # operations of an ODL count from 1 on the page
     odl = "$" + (r"\,".join(terms) or "T_0") + "$"
     ink, line = (_INK, "-") if stands else (_GONE, _DASHES)
     box = {"boxstyle": "round,pad=0.4", "facecolor": face if stands else "white", "edgecolor": ink, "linestyle": line}

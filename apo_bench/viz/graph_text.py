@@ -1,4 +1,4 @@
-"""A relation graph as lines, as one JSON object, and as Mermaid text."""
+"""A relation graph as lines of text, as one JSON object, and as Mermaid text."""
 
 from typing import Any
 
@@ -9,11 +9,11 @@ _SCHEMA = "apo-bench/graph/1"
 
 
 def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str]:
-    """Each part at its placements with the ODL, then each arc: when it was made and lost, faces, residual.
+    """Return the lines of a graph: nodes with their ODL, then arcs with operations, faces and residuals.
 
     Args:
-        residuals: Of each arc, [m]; None where it is not known.
-        gap_m: Largest residual of a contact that holds.
+        residuals: Residual of each arc, [m]; None where it is unknown.
+        gap_m: Largest residual of a contact that holds, [m].
     """
     nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
     arcs = []
@@ -26,7 +26,7 @@ def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str
 
 
 def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str, Any]:
-    """The JSON object: operations from 1, residuals in mm (null where unknown)."""
+    """Return a graph as a JSON object: operations from 1, residuals in mm (null where unknown)."""
     return {
         "schema": _SCHEMA,
         "scenario": scenario,
@@ -48,7 +48,7 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str
 
 
 def mermaid_text(graph: Graph) -> str:
-    """A flow chart that GitHub and other readers of Markdown draw; contacts that disappeared are dotted."""
+    """Return a Mermaid flow chart, which GitHub renders; contacts that disappeared are dotted."""
     number = {node: i for i, node in enumerate(graph.nodes)}
     lines = ["flowchart TD"]
     lines += [f'  n{i}["{node.part}<br>{_odl(node)}"]' for node, i in number.items()]

@@ -1,4 +1,4 @@
-"""The sheet of a noise model: what it states about itself, and a table of the errors that it makes."""
+"""The sheet of a noise model: its stated facts, and a table of the errors that it draws."""
 
 import inspect
 from collections.abc import Iterator, Mapping
@@ -17,30 +17,30 @@ from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"
 _DRAWS = 1000
-"""Observations of that scenario, three operations each, in a table."""
+"""Number of simulated observations of `SCENARIO` in the table, three operations each."""
 _ERRORS = ("across the ray [mm]", "along the ray [mm]", "tilt [deg]", "about the ray [deg]")
 _PERCENTILES = (50, 90, 99)
 
 
 class ErrorSample(NamedTuple):
-    """Errors that a model made."""
+    """Errors drawn from a noise model, and the standard deviations that the model states."""
 
     errors: Array
-    """(m, 4), in the frame of the default camera's ray: across and along in mm, tilt and about the ray in degrees."""
+    """(m, 4), in the frame of the default camera's ray: across and along in mm, tilt and turn about it in degrees."""
     stated: Array
-    """(4,), root mean square of the standard deviations that the observations stated, in the same units."""
+    """(4,), root mean square of the stated standard deviations, in the same units."""
     missed: float
     """Share of operations that were not observed."""
 
 
 def list_models() -> Mapping[str, str]:
-    """Name -> title of every model that has a name."""
+    """Return name -> title of every noise model that has a name."""
     measured = {name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()}
     return {name: find_facts(name).title for name in NOISES} | measured
 
 
 def find_facts(model: Any) -> Facts:
-    """What a model states about itself; of one that states nothing, its docstring."""
+    """Return the `FACTS` of a model; of a model without them, its docstring as the title."""
     model = _resolve_model(model)
     own = getattr(model, "FACTS", None)
     title = (inspect.getdoc(model) or "A noise model without a description.").split("\n\n")[0]
@@ -48,7 +48,11 @@ def find_facts(model: Any) -> Facts:
 
 
 def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
-    """Errors of many observations of the nominal example 5.1; operations that were not observed have none."""
+    """Draw errors in many observations of the nominal example 5.1, leaving out operations that were not observed.
+
+    Args:
+        model: Name or object of a noise model.
+    """
     noise = make_noise(model, noise_level)
     demonstration = nominal_demonstration()
     camera = Camera()
@@ -57,13 +61,13 @@ def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
     variances = []
     for _ in range(_DRAWS):
         observation = observe(demonstration, noise, rng)
-        # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
+        # rotate the error twist xi of T Exp(xi) from the part's frame to the ray's: Q has R_ray^T R_part twice on its diagonal
         Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.poses), 1, 2) @ observation.poses[:, :3, :3])
         xi = (Q @ pose.log(pose.inverse(demonstration.poses) @ observation.poses)[..., None])[..., 0]
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
         errors.append(xi[observation.observed])
         variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.observed])
-    # x is across the ray and z along it; rx tilts it and rz turns about it
+    # columns of a twist in the ray's frame: x across the ray, z along it; rx tilts the part, rz turns it about the ray
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
     stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
@@ -72,7 +76,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
 
 
 def nominal_demonstration() -> Demonstration:
-    """The demonstration of an ideal human: the nominal poses of example 5.1, in the middle of their place."""
+    """Return the demonstration of an ideal human: the nominal poses of example 5.1 at the centre of their area."""
     scenario = load_scenario(SCENARIO)
     poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.nominal_poses
     final = compute_placements(scenario.assembly, scenario.start, poses)[-1]
@@ -80,7 +84,7 @@ def nominal_demonstration() -> Demonstration:
 
 
 def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample) -> str:
-    """The sheet of a model in Markdown, with a table of errors that it made."""
+    """Return the sheet of a model in Markdown, with a table of the drawn errors."""
     facts = describe_model(model)
     if not len(sample.errors):
         return f"{facts}\nNo operation of {SCENARIO} was observed.\n"
@@ -91,7 +95,7 @@ def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample) -> str
 
 
 def describe_model(model: Any, heading: int = 1) -> str:
-    """What a model states about itself, in Markdown."""
+    """Return the stated facts of a model in Markdown, under a heading of this level."""
     facts = find_facts(model)
     name = model if isinstance(model, str) else getattr(model, "__name__", type(model).__name__)
     lines = [f"Frame: {facts.frame}"] * bool(facts.frame)
@@ -104,7 +108,7 @@ def describe_model(model: Any, heading: int = 1) -> str:
 
 
 def _tabulate(sample: ErrorSample) -> Iterator[str]:
-    """Deviation found, deviation stated, and percentiles of the size, of each error: a table in Markdown."""
+    """Yield the lines of a Markdown table: of each error its deviation, the stated deviation, and percentiles."""
     found = np.sqrt(np.mean(sample.errors**2, axis=0))
     sizes = np.percentile(np.abs(sample.errors), _PERCENTILES, axis=0)
     yield f"| {'error':20} |" + "".join(f" {head:>9} |" for head in ("deviation", "stated", "p50", "p90", "p99"))
@@ -114,6 +118,9 @@ def _tabulate(sample: ErrorSample) -> Iterator[str]:
 
 
 def _resolve_model(model: Any) -> Any:
-    """What a name stands for: a class, or an object that no noise level changes; a measured one at level 1."""
+    """Return the class or object of a noise model's name.
+
+    Measured and failure models are made at noise level 1, since their facts do not depend on the level.
+    """
     known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
     return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

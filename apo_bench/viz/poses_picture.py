@@ -1,4 +1,4 @@
-"""The parts where observed or corrected poses put them after a step, as text and as a picture (Fig. 9, 13 and 16)."""
+"""Where observed or corrected poses place the parts after an operation, as text and as a picture (Fig. 9, 13, 16)."""
 
 import textwrap
 from collections.abc import Sequence
@@ -22,28 +22,33 @@ from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.scene import aim_camera, build_scene, draw_picture
 from apo_bench.viz.panels import Panel, PanelLine, draw_panels
 
-_SIZE = (620, 480)
+_SIZE = (620, 480)  # width and height of each picture, in pixels
 _AZIMUTH_DEG = 28.0
 _ELEVATION_DEG = -20.0
-_MOST_LINES = 6
-_LETTERS = 86
+_MOST_LINES = 6  # most lines about open contacts below a picture
+_LETTERS = 86  # most letters in a line of a warning
 
 
 class PosesPanel(NamedTuple):
-    """Where poses put the parts, and which contacts they do not make."""
+    """The poses of parts after a step, and the contacts that do not hold there."""
 
     title: str
     poses: Poses
     gap_m: float
-    """The largest |e| of all contacts."""
+    """The largest residual |e| of all contacts, [m]."""
     open: tuple[str, ...]
-    """`R4 stick -> castle2: 1.31 mm`, the worst first; then `R1 castle1 -> table: no overlap`."""
+    """Contacts that do not hold: `R4 stick -> castle2: 1.31 mm`, worst first; then `R1 castle1 -> table: no overlap`."""
     warning: str = ""
-    """What the consistency test and the failure prediction say."""
+    """Result of the consistency test and the failure prediction; empty if there is none."""
 
 
 def poses_panel(title: str, observation: Observation, poses: Array, step: int, warning: str = "") -> PosesPanel:
-    """The assembly at poses (n, 4, 4), world frame, [m], after so many operations."""
+    """Place the parts and measure their contacts.
+
+    Args:
+        poses: Poses of the operations, (n, 4, 4), world, [m].
+        step: Number of operations that are done.
+    """
     assembly = observation.assembly
     graph = build_relation_graph(assembly, step)
     residuals = compute_arc_residuals(assembly, observation.start, poses, graph)
@@ -60,7 +65,7 @@ def poses_panel(title: str, observation: Observation, poses: Array, step: int, w
 
 
 def poses_lines(panels: Sequence[PosesPanel]) -> list[str]:
-    """A sentence for each: `observed: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
+    """Return a sentence for each panel: `observed: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
     lines = []
     for panel in panels:
         holds = f"open: {', '.join(panel.open)}" if panel.open else "all contacts hold"
@@ -74,7 +79,7 @@ def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out:
     """Write the panels side by side, from one point of view, as PNG.
 
     Raises:
-        InputError: Nothing here can draw, or the file cannot be written.
+        InputError: This machine cannot render, or the file cannot be written.
     """
     scene = build_scene(scenario)
     assembly = scenario.assembly

@@ -1,7 +1,7 @@
-"""The probing motions of a plan for a real robot: contacts, squaring grips, laying flat, the spiral search.
+"""The probing motions of a plan for a real robot: touches, squaring grips, laying flat, the spiral search.
 
-All places and numbers are those of the simulation. Planes are in the frame of the base; a point that makes contact, and
-the pose of a part in the hand, are in the frame of the tip, also where poses are of the flange.
+All places and numbers are those of the simulation. Planes are in the frame of the base. Contact points and the pose of
+a part in the hand are in the frame of the tip, even if other poses are those of the flange.
 """
 
 from collections.abc import Sequence
@@ -40,13 +40,14 @@ from apo_bench.viz.robot_form import format_robot_pose, tip_form
 
 
 def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
-    """The JSON object: mm, N, Nm, s, degrees and unit vectors.
+    """Return the probing motions as a JSON object: mm, N, Nm, s, degrees and unit vectors.
 
     Args:
+        frames: Frames of the robot that poses are converted to.
         sensor: Force-torque sensor of the wrist, as in `parse_ft_noise`.
 
     Raises:
-        InputError: An unknown sensor.
+        InputError: The sensor is unknown.
     """
     noise = parse_ft_noise(sensor)
     filtered = filter_noise(noise, compute_low_pass_gain())
@@ -90,6 +91,7 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
 
 
 def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
+    """Return one touch: the tip's start, its direction, the contact patch in the tip's frame, the expected plane."""
     return {
         "from": tip_form(place.T_world_tip, frames),
         "direction": _turned(place.direction, frames),
@@ -100,6 +102,7 @@ def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
 
 
 def _step(move: Move, scene: Scene, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any]:
+    """Return the probing motions around one move of a part."""
     t = move.transfer
     first = t.grips[0]
     return {
@@ -115,7 +118,7 @@ def _step(move: Move, scene: Scene, frames: RobotFrames, filtered: FtNoise) -> d
 
 
 def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, Any]:
-    """Fingers that close on a part at T, (4, 4), world."""
+    """Return a grip on a part whose pose is T, (4, 4), world, [m]."""
     return {
         "at": tip_form(T @ grip.T_part_tip, frames),
         "each_finger_open_mm": _mm(min(grip.half_width + OPEN_TO_PICK_M, scene.arm.opening_m)),
@@ -124,11 +127,12 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
 
 
 def _laid(t: Transfer, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any] | None:
-    """None where the sensor could not tell lying."""
+    """Return how a part is laid flat on a surface, or None if the noise of the sensor is too large for that."""
     averaged = lay_flat.averaged_s(t.flat, filtered)
     if averaged > lay_flat.LONGEST_S:
         return None
-    grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
+    # an arriving part that leaves no contact has its first grip; after a departure the grip has been changed once
+    grip = t.grips[0 if t.out.left is None else 1]
     foot = pose.apply(t.flat.T, t.flat.feet[:1])[0]
     return {
         "when": "before the last motion" if t.into.level else "before it is carried",
@@ -151,7 +155,12 @@ def _laid(t: Transfer, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any]
 
 
 def _plane(normal: Array, offset: float, frames: RobotFrames) -> dict[str, Any]:
-    """normal . x = offset, in the base."""
+    """Return the plane normal . x = offset in the frame of the base.
+
+    Args:
+        normal: Unit vector, (3,), world.
+        offset: Of the plane in the world, [m].
+    """
     return {
         "normal": _turned(normal, frames),
         "offset_mm": _mm(offset - float(normal @ frames.T_world_base[:3, 3])),
@@ -159,6 +168,7 @@ def _plane(normal: Array, offset: float, frames: RobotFrames) -> dict[str, Any]:
 
 
 def _turned(way: Array, frames: RobotFrames) -> list[float]:
+    """Rotate a world vector, (3,), to the frame of the base."""
     return _rounded(frames.T_world_base[:3, :3].T @ way, 12)
 
 
@@ -167,7 +177,7 @@ def _mms(point: Array) -> list[float]:
 
 
 def _rounded(values: Array | Sequence[float], digits: int) -> list[float]:
-    return (np.round(values, digits) + 0.0).tolist()
+    return (np.round(values, digits) + 0.0).tolist()  # + 0.0 turns -0.0 into 0.0
 
 
 def _mm(metres: float) -> float:

@@ -1,8 +1,8 @@
-"""A plan in a robot's terms: poses of tip or flange in the frame of its base, motions with guards, mm.
+"""A plan as a robot executes it: poses of tip or flange in the frame of its base, motions with guards, in mm.
 
 The tip is between the fingertips: z points ahead, x along the direction in which the fingers close. Each motion is a
-straight line `from` a pose `to` a pose. A guarded motion ends where the robot measures contact against its direction,
-which should be at `to`; it begins as far before as the plan comes from, else 5 mm.
+straight line `from` a pose `to` a pose. A guarded motion ends when the robot measures contact against its direction,
+which is expected at `to`. It begins at the plan's distance before that, or 5 mm if the plan states none.
 """
 
 from collections.abc import Sequence
@@ -19,24 +19,24 @@ from apo_bench.viz.plan_text import PlanLine
 
 _SCHEMA = "apo-bench/robot-plan/1"
 _GUARDED_FROM_M = 0.005  # length of a guarded motion for which the plan states none
-_BEYOND_M = 0.002  # a guarded motion goes this far beyond the expected contact
-_ABOVE_M = 0.1  # the robot approaches a part from so far above, and leaves it by so far back along the tip
-_ALONG = 0.999  # cosine of directions that are the same
+_BEYOND_M = 0.002  # how far a guarded motion continues beyond the expected contact
+_ABOVE_M = 0.1  # height of the approach above the grasp, and length of the retreat along the tip
+_ALONG = 0.999  # directions whose cosine is larger count as equal
 
 
 def robot_form(
     lines: Sequence[PlanLine], plan: Plan, scenario: Scenario, frames: RobotFrames, notes: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """The JSON object: one entry for each step, undone steps too, mm and unit vectors.
+    """Return a plan as a JSON object with an entry for each step, undone steps included; mm and unit vectors.
 
     Args:
-        lines: Of the plan, step by step.
-        notes: Assumptions, and what speaks against the plan.
+        lines: The steps of the plan, of `plan_lines`.
+        notes: Assumptions of the plan and objections to it, one sentence each.
     """
     assembly = plan.assembly
     poses = plan.start
     steps = []
-    history: list[Poses] = []
+    history: list[Poses] = []  # poses before each done operation, to which undoing it returns
     for line in lines:
         if line.target is None:
             after = history.pop()
@@ -69,9 +69,14 @@ def robot_form(
 
 
 def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFrames) -> dict[str, Any]:
-    """A step that takes its main part from one pose to another, (4, 4), world, [m]."""
+    """Return a step that moves its main part.
+
+    Args:
+        here, goal: Pose of the part before and after, (4, 4), world, [m].
+    """
     part = line.what.main
     grip = tip_in_part(line.grasp, here)
+    # extent of the part's bounding box along the closing direction: an upper bound of the width between the fingers
     width = float(np.abs(line.grasp.across) @ np.ptp(plan.assembly.solids[part].bounds, axis=0))
     tip = here @ grip
     end = goal @ grip
@@ -98,8 +103,11 @@ def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFra
 
 
 def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
-    """The tip in the frame of the part, (4, 4): looking down where the part stands like this, or as the grasp says."""
-    # world -z in the frame of the part: z of the tip; x is the grasp's direction with what is along z taken out
+    """Return the pose of the tip in the frame of the part, (4, 4), [m].
+
+    The tip looks along `grasp.ahead`, or else straight down at a part of pose `T_world_part`.
+    """
+    # world -z in the frame of the part is the tip's z axis; its x axis is the part of `across` perpendicular to that
     down = -T_world_part[2, :3] if grasp.ahead is None else grasp.ahead
     across = grasp.across - (grasp.across @ down) * down
     across = across / np.linalg.norm(across)
@@ -109,7 +117,12 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
 
 
 def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
-    """The motions by which the part leaves its contacts, one after the other."""
+    """Return the motions by which the part leaves its contacts, in order, each from the end of the one before.
+
+    Args:
+        here: Pose of the part before them, (4, 4), world, [m].
+        grip: Pose of the tip in the frame of the part, (4, 4), [m].
+    """
     motions = []
     end = here
     for macro in line.leaves.departs:
@@ -121,7 +134,12 @@ def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> l
 
 
 def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
-    """The motions by which the part comes to its goal: the last one ends there, each where the next one begins."""
+    """Return the motions by which the part arrives, in order, the last of which ends at the goal.
+
+    Args:
+        goal: Pose of the part at the end, (4, 4), world, [m].
+        grip: Pose of the tip in the frame of the part, (4, 4), [m].
+    """
     axis = goal[:3, :3] @ line.comes.line.direction
     macros = list(line.comes.macros)
     if not macros:
@@ -129,9 +147,11 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     motions = []
     begin = goal
     ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]
-    # the first motion along the insertion axis is as long as that; others as long as their macro states
+    # the first motion along the insertion axis has its travel; others have the length of their macro
     along = next((i for i, way in enumerate(ways) if way @ axis > _ALONG), None)
-    for i, (macro, way) in reversed(list(enumerate(zip(macros, ways, strict=True)))):
+    for i, (macro, way) in reversed(
+        list(enumerate(zip(macros, ways, strict=True)))
+    ):  # from the goal backwards, since only the last pose is known
         end = begin
         begin = _shift(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
         motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
@@ -141,6 +161,7 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
 def _motion(
     name: str, guarded: bool, begin: Array, end: Array, way: Array, grip: Array, frames: RobotFrames
 ) -> dict[str, Any]:
+    """Return a straight motion of the part from `begin` to `end`, (4, 4), world, in direction `way`, (3,), world."""
     direction = pose.inverse(frames.T_world_base)[:3, :3] @ way
     return {
         "macro": name,
@@ -154,17 +175,22 @@ def _motion(
 
 
 def tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
-    """A pose of the tip, or of the flange that carries it, in the frame of the base."""
+    """Return a pose of the tip, or of the flange that carries it, in the frame of the base.
+
+    Args:
+        T_world_tip: (4, 4), world, [m].
+    """
     T = pose.inverse(frames.T_world_base) @ T_world_tip
     return format_robot_pose(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
 
 
 def format_robot_pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
-    """A pose in mm, with the quaternion in the order of the robot."""
+    """Return a pose, (4, 4), [m], in mm, with the quaternion in the order of the robot."""
     packed = pose.pack(T)
-    q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)
+    q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)  # xyzw if not wxyz
     return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}
 
 
 def _shift(T: Array, way: Array, far: float) -> Array:
+    """Translate a pose by `far` [m] along a unit vector of the world."""
     return pose.at(far * way) @ T

@@ -31,7 +31,7 @@ arm list
 part import a.step --out parts
 inspect depth block_on_block
 view block_on_block
-report run --pictures 1
+report run --max-pictures 1
 compare run run
 doctor
 """

@@ -35,7 +35,7 @@ COMMANDS = {
     "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",
     "scenario new block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
     "leaderboard entries --out page.md": "page.md page.png",
-    "report rows --pictures 0": (
+    "report rows --max-pictures 0": (
         "rows/report.html rows/tables/records.parquet rows/tables/conditions.csv "
         "rows/tables/conditions.parquet rows/figures/success_over_noise_level.svg"
     ),

@@ -38,7 +38,13 @@ def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
 
 @pytest.mark.parametrize(
     "changed",
-    [{"invented": 1}, {"worst_gap_mm": float("nan")}, {"dropped": [3]}, {"p_value": 2.0}, {"wrong_contact": "\ud800"}],
+    [
+        {"invented": 1},
+        {"worst_gap_mm": float("nan")},
+        {"dropped_contacts": [3]},
+        {"p_value": 2.0},
+        {"wrong_contact": "\ud800"},
+    ],
 )
 def test_a_record_that_could_not_be_read_is_not_written(changed: dict[str, Any], made: list[dict[str, Any]]) -> None:
     assert unwritable(made[0] | changed)

@@ -107,14 +107,14 @@ def test_the_row_says_what_the_correction_says_of_itself(
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: doubts(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["chi_square"], row["chi_square_dof"], row["p_value"]) == (30.0, 5, 1e-5)
-    assert (row["consistency_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
+    assert (row["consistent"], row["suspects"], row["dropped_contacts"]) == (False, ["R1"], ["R1"])
     for method in ("oracle", "uncorrected", "paper"):
-        assert (rows[method]["consistency_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (
+        assert (rows[method]["consistent"], rows[method]["suspects"], rows[method]["chi_square"]) == (
             None,
             None,
             None,
         )
-    assert [rows[method]["dropped"] for method in ("oracle", "uncorrected", "paper")] == [None, None, []]
+    assert [rows[method]["dropped_contacts"] for method in ("oracle", "uncorrected", "paper")] == [None, None, []]
 
 
 def test_wrong_relations_are_told_and_noted(

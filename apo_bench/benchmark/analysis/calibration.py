@@ -43,7 +43,7 @@ def _line(axes: Line, trials: Trials) -> Line:
     clearance = planned.number("clearance_mm")
     loose = clearance > 0
     inside = trials.number("inside_95")
-    passes = trials.number("consistency_passes")
+    passes = trials.number("consistent")
     # failed tests of trials with a wrong contact that is known
     known = trials.where((passes == 0) & ~trials.holds("wrong_contact", (None,).__contains__))
     # whether the suspects contain the wrong contact

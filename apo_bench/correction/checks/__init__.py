@@ -1,1 +1,1 @@
-"""Checks of any correction: is it executable, how did it end, and does the stated noise explain it."""
+"""Checks of any correction: whether it is executable, how it ended, and whether the stated noise explains it."""

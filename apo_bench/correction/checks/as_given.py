@@ -1,4 +1,4 @@
-"""Poses to be executed as they are, whatever gap they leave: that gap is measured, and stated in the sentence."""
+"""Corrections from bare poses: the remaining gap is measured and stated in the sentence, whatever it is."""
 
 from collections.abc import Callable, Collection
 
@@ -24,16 +24,17 @@ from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 
 TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
+"""Units of a twist in which the paper's solver measures singular values: metres, and metres per radian."""
 
 
 def poses_as_given(observation: Observation, poses: Array, sentence: str) -> Correction:
-    """A correction of these poses, (n, 4, 4), to be executed as it is, whatever gap it leaves.
+    """Wrap poses, (n, 4, 4), as a correction to be executed as it is, whatever gap remains.
 
     Args:
         sentence: The sentence, if a contact does not hold within `observation.gap_m`.
 
     Returns:
-        `converged`; `not_finite`, and what was observed, if a number is not finite.
+        `converged`; `not_finite` with the observed poses, if a number is not finite.
     """
     before = measure_largest_gap(observation.assembly, observation.start, observation.poses)
     if not np.isfinite(poses).all():
@@ -49,7 +50,8 @@ def poses_as_given(observation: Observation, poses: Array, sentence: str) -> Cor
 
 
 def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()) -> float:
-    """The largest |e| at poses (n, 4, 4) of what is asked of the contacts, [m]; or how far an inequality is violated.
+    """The largest violation of any contact at poses (n, 4, 4), [m]: |e| of an equation, or how far an inequality is
+    off.
 
     Args:
         dropped: Relations, or single contacts, that do not count.
@@ -63,14 +65,14 @@ def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()
 
 
 def run_method(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
-    """What a method that promises nothing makes of an observation, with the gap that it leaves in the sentence.
+    """Run a baseline on an observation, with the remaining gap in the sentence.
 
     Args:
-        method: Poses (n, 4, 4) out of an observation of which every operation was observed.
+        method: Takes an observation in which every operation was observed to poses, (n, 4, 4).
         done: What the method did, the beginning of the sentence.
 
     Returns:
-        As `poses_as_given`, or `not_seen`; what was observed where there is no contact.
+        As `poses_as_given`, or `not_seen`; the observed poses if there is no contact.
     """
     if not observation.observed.all():
         return refuse_correction(observation)

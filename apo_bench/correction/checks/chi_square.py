@@ -1,8 +1,8 @@
-"""Is a relation wrong? The chi-square test of a correction.
+"""Chi-square test of a correction, which detects wrong relations.
 
-If every relation is right and the stated noise is too, the squared length of the correction is chi-square distributed
-with as many degrees of freedom as the contacts fix. A redundant contact that is wrong contradicts the others; one that
-is not redundant only asks for a correction that is too long.
+If all relations and the stated noise are right, the squared length of the correction is chi-square distributed, with as
+many degrees of freedom as the contacts fix. A wrong contact that is redundant contradicts the others; one that is not
+redundant only makes the correction too long.
 """
 
 from math import isfinite, sqrt
@@ -15,19 +15,20 @@ from apo_bench.correction.solvers import SMALLEST, count_plays
 from apo_bench.geometry import Array, copy_frozen, remember
 
 TEST_LEVEL = 0.01
-"""False alarms that are accepted."""
+"""Accepted rate of false alarms."""
 ROUNDING = 1e-13
-"""Part of the largest diagonal entry that is added to all: redundant contacts without play have no other."""
+"""Fraction of the largest diagonal entry that is added to all, since redundant contacts without play make A
+singular."""
 CONTRADICTION_M = 0.05e-3
-"""Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured. They hold
-if no compact equation, which counts sqrt(v) times at the centre of v vertices, is off by more."""
+"""Standard deviation given to contradictory contacts, [m], so that their contradiction can be measured. Contacts hold
+if no compact equation is off by more; it counts sqrt(v) times at the centre of v vertices."""
 
 
 @remember
 def fit_deviation(assembly: Assembly, play_m: float) -> Array:
-    """The standard deviation of each compact equation, (3 c,), [m]: a contact that fits is uniform within its play.
+    """The standard deviation of each compact equation, (3 c,), [m]: a fit contact is uniform within its play.
 
-    A row stands for all vertices of its contact, so it is off by as much as they are together.
+    A row stands for all v vertices of its contact, so its deviation is sqrt(v) times that of one vertex.
     """
     count, unit_m = count_plays(assembly, play_m)
     each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(find_contact_pattern(assembly).begin))
@@ -35,19 +36,24 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
 
 
 def p_value(chi_square: float, degrees: int) -> float:
-    """The chance of a chi-square at least as large, of so many degrees of freedom; 1 where nothing is tested."""
+    """The probability of a chi-square at least as large with these degrees of freedom; 1 if there are none."""
     if not isfinite(chi_square):
         return 0.0
     return float(chdtrc(degrees, chi_square)) if degrees else 1.0
 
 
 def soft_chi_square(z: Array, Jt: Array, S: Array) -> Array:
-    """The squared length, (b,), of corrections z, (b, 6 n), if equations may be off by covariance S, (3 c, 3 c), [m^2].
+    """The squared length of corrections, (b,), if equations may be off.
 
-    Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what
-    equations are off by is r^t (J J^t + S)^-1 r, with r = J z what the observation was off by.
+    Near z the equations are linear, so the least sum of squares of z and of the residuals of the equations is r^t (J
+    J^t + S)^-1 r, with r = J z the residual at the observation.
+
+    Args:
+        z: The corrections, (b, 6 n), in standard deviations.
+        Jt: (b, 6 n, 3 c), the transposed derivative of the equations by z.
+        S: Covariance of the equations, (3 c, 3 c), [m^2].
     """
-    # r is what the observation was off by, Gaussian with covariance J J^t of noise and S of play.
+    # The residual r at the observation is Gaussian with covariance J J^t from noise plus S from play.
     J = np.swapaxes(Jt, 1, 2)
     A = J @ Jt + S
     r = J @ z[..., None]

@@ -1,4 +1,4 @@
-"""What a corrector may be given, and what one of somebody else may return."""
+"""Validation of what a corrector gets, and of what a corrector from outside the package returns."""
 
 from collections.abc import Sequence
 from math import inf
@@ -11,13 +11,13 @@ from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 from apo_bench.io import UNSHOWN
 
 _SAME = 1e-9
-"""Poses that differ by less, [m] and unitless, are one and the same."""
+"""Difference, [m] and unitless, up to which two poses are the same."""
 _ASYMMETRY = 1e-9
-"""How far a covariance may be from symmetric, as a part of its largest entry."""
+"""Largest asymmetry of a covariance, as a fraction of its largest entry."""
 
 
 def check_observation(observation: Observation) -> None:
-    """Refuse an observation that no corrector can make sense of.
+    """Reject an observation that no corrector can process.
 
     Raises:
         InputError: A pose is not rigid or absurdly far away, a part has no start, a covariance is not symmetric, or a
@@ -27,7 +27,10 @@ def check_observation(observation: Observation) -> None:
 
 
 def check_observations(observations: Sequence[Observation], names: Sequence[str]) -> None:
-    """Refuse the same of several observations, which have these names.
+    """Check several observations as `check_observation` does.
+
+    Args:
+        names: The name of each observation in error messages.
 
     Raises:
         InputError: As of one, with the name of the observation.
@@ -58,7 +61,7 @@ def check_observations(observations: Sequence[Observation], names: Sequence[str]
 
 
 def check_poses(T: Array, names: Sequence[str]) -> None:
-    """Refuse poses, (k, 4, 4), that are not rigid, or so far away that nothing can be computed with them.
+    """Reject poses, (k, 4, 4), that are not rigid, or too far away to compute with.
 
     Raises:
         InputError: With the name of the first of them.
@@ -77,7 +80,7 @@ def check_poses(T: Array, names: Sequence[str]) -> None:
 
 
 def check_correction(correction: Correction, assembly: Assembly, name: str) -> None:
-    """Refuse a correction by the corrector called `name` that cannot be executed or written into a record.
+    """Reject a correction by the corrector called `name` that cannot be executed or written into a record.
 
     Raises:
         InputError: The first thing that is wrong.

@@ -1,4 +1,4 @@
-"""How a correction ends: a status with its sentence."""
+"""Status and sentence with which a correction ends."""
 
 from dataclasses import replace
 
@@ -10,10 +10,11 @@ from apo_bench.records import outcomes
 
 
 def solver_status(solution: Solution, left_m: float, gap_m: float) -> str:
-    """How the solver of the paper ended, of `paper` and its kin: `converged` if what is left, [m], is within `gap_m`.
+    """The status of the paper's solver, for `paper` and related methods: `converged` if the gap, [m], is within
+    `gap_m`.
 
-    Otherwise `inconsistent` where it came to rest with a gap open, and `not_converged` where it still moved. `contact`
-    has a rule of its own (`contact._status`).
+    Otherwise `inconsistent` if the solver converged with an open gap, and `not_converged` if it still moved. `contact`
+    has another rule (`contact._status`).
     """
     if not solution.finite:
         return "not_finite"
@@ -23,12 +24,14 @@ def solver_status(solution: Solution, left_m: float, gap_m: float) -> str:
 
 
 def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str:
-    """What a status means; `of` says which contacts were looked at."""
+    """A status in words; `of` names the contacts that were checked."""
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.describe_outcome(status)
 
 
 def check_facing(observation: Observation, correction: Correction) -> Correction:
-    """A correction as it is; `inconsistent` in place of `converged` where faces that should touch look the same way."""
+    """Change `converged` to `inconsistent` where faces in contact look the same way; other corrections stay
+    unchanged.
+    """
     if not correction.ok:
         return correction
     assembly = observation.assembly
@@ -45,7 +48,7 @@ def check_facing(observation: Observation, correction: Correction) -> Correction
 
 
 def refuse_correction(observation: Observation) -> Correction:
-    """What was observed, unchanged: an operation without a pose has no motion parameter to start from."""
+    """The correction `not_seen`, with the observed poses: an operation was not observed."""
     missing = int(np.argmin(observation.observed))
     now = measure_largest_gap(observation.assembly, observation.start, observation.poses)
     return Correction(

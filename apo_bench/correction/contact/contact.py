@@ -1,6 +1,6 @@
 """The corrector `contact`: the most likely consistent poses, tested against the stated noise.
 
-Every motion parameter is free; what the contacts do not ask for is not changed, since any change costs likelihood.
+All motion parameters are free. Directions that no contact fixes stay as observed, since any change costs likelihood.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ from apo_bench.errors import require
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3
-"""Relations that `drop` leaves out at most."""
+"""Most relations that `drop` leaves out."""
 
 
 @final
@@ -82,12 +82,12 @@ class ContactCorrector:
         return self.together((observation,))[0]
 
     def together(self, observations: Sequence[Observation]) -> list[Correction]:
-        """Correct observations of one assembly with the same start poses and play, at once.
+        """Correct observations of one assembly with the same start poses and play, in one batch.
 
         Raises:
             InputError: As of one.
         """
-        # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
+        # Direct callers pass round faces; observations that `correctors.correct` has projected come back unchanged.
         observations = project_observations(observations)
         results = [None if all(each.observed.tolist()) else refuse_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
@@ -102,14 +102,14 @@ class ContactCorrector:
 
     @check_arguments
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
-        """Correct an observation by all contacts but those of some relations."""
+        """Correct an observation without the contacts of some relations."""
         problem = problem_of((observation,), self.level)
         solved = solve(problem, problem.without(dropped))[0]
         (before_m,) = problem.seen_gap_m()
         return check_facing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
     def _correct(self, observations: Sequence[Observation]) -> list[Correction]:
-        """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
+        """Correct a batch of projected, fully observed observations together; doubtful ones again one by one."""
         problem = problem_of(observations, self.level)
         corrections = []
         for i, (before_m, solved) in enumerate(
@@ -123,7 +123,9 @@ class ContactCorrector:
         return corrections
 
     def _in_doubt(self, problem: Problem, solved: Solved, before_m: float) -> Correction:
-        """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
+        """Correct an observation whose first solution is invalid, far, or fails the test: try other starts, rank
+        suspects.
+        """
         if self.elsewhere:
             problem, solved = best_start(problem, solved)
         test = solved.test
@@ -144,7 +146,9 @@ class ContactCorrector:
         return check_facing(problem.observation, report)
 
     def _most_suspect(self, problem: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
-        """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
+        """The name of one contact of the most suspect relation if the test passes without it; else of the whole
+        relation.
+        """
         single = contact_suspects(problem, kept, worst.relation)[0]
         return single.relation if single.p_value >= self.level else worst.relation
 
@@ -161,7 +165,9 @@ class ContactCorrector:
         """The correction of observation i.
 
         Args:
-            test_before: The test before anything was dropped; None if that is the one of what was solved.
+            before_m: The largest gap at the observed poses, [m].
+            test_before: The test before relations were dropped; None if none were.
+            turned: Part of the sentence on operations that were observed turned.
         """
         gap_m = problem.observations[i].gap_m
         test = test_before or solved.test
@@ -198,11 +204,11 @@ contact_drop = ContactCorrector("drop")
 
 
 def _status(solved: Solved, gap_m: float) -> str:
-    """How the solver ended.
+    """The status of a solution.
 
-    A gap that is open says `inconsistent`, whether the solver rests or has used up its iterations; `not_converged` says
-    that contacts hold and steps go on. `status.solver_status`, of the solver of the paper, differs: there what holds
-    has converged, and a gap says `not_converged` unless the solver rests.
+    `inconsistent` if a gap is open, whether or not the solver converged; `not_converged` if contacts hold but the
+    solver still moves. The paper's solver has another rule, `status.solver_status`: contacts that hold count as
+    converged.
     """
     if not solved.finite:
         return "not_finite"
@@ -212,7 +218,7 @@ def _status(solved: Solved, gap_m: float) -> str:
 
 
 def _doubts(test: Consistency, dropped: tuple[str, ...]) -> str:
-    """What the test says, if it has something to say."""
+    """The part of the sentence on a failed test; empty if the test passes."""
     if test.passes:
         return ""
     named = ", ".join(suspect.relation for suspect in test.ambiguous) or "none alone"

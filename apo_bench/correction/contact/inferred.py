@@ -1,9 +1,8 @@
-"""Where operations led whose observation is missing or rejected: inferred from their contacts and what is around.
+"""Poses of missing or rejected operations, inferred from their contacts with parts whose poses are known.
 
-A contact says that two normals oppose, that a point lies in a plane, and that two faces cover each other, so their
-middles are not far apart; or that two axes are one line. With the poses of all other operations in its equations known,
-a contact of an operation says this of its pose alone. The operation of which most is said is inferred first; then it is
-known to the others. Longer than other files: what flat and round faces say, and the pose that follows, is one idea.
+A contact states that two normals oppose, a point lies in a plane, and two faces overlap, so their middles are near each
+other; or that two axes are one line. If all other poses in its equations are known, it constrains the pose of one
+operation. The most constrained operation is inferred first; then it counts as known for the others.
 """
 
 from collections.abc import Collection, Sequence
@@ -16,41 +15,44 @@ from apo_bench.assembly import Assembly, Contact, Observation, classify_contact,
 from apo_bench.geometry import Array, list_quarter_turns, pose, remember
 
 _APART = 0.1
-"""Normals with a smaller singular value are in one plane, or along one line."""
+"""Relative singular value below which directions count as coplanar or parallel."""
 _PLANE_M = 1e-3
-"""How exactly a contact states its plane, compared with how far middles of faces may be apart, [m]."""
+"""Standard deviation of a point in its plane, [m], when weighed against the distance of the middles of faces."""
 _SAME_WAY = 0.99
+"""Cosine above which two directions are the same."""
 
 
 _Lie = Literal["opposite", "along", "across"]
-"""How two directions lie to each other: two normals, two axes of whichever sense, an axis and a normal."""
+"""Relation of two directions: opposite normals, axes along each other in either sense, an axis across a normal."""
 _MOST_AXES = 6
-"""Axes whose senses are tried with each other; of more, each points as it was observed."""
+"""Number of axes whose senses are tried in all combinations; of more, each keeps its observed sense."""
 
 
 class Ends(NamedTuple):
-    """The two faces of a contact, each in the frame of its own part."""
+    """The directions and middles of the two faces of a contact, each in the frame of its own part."""
 
     directions: tuple[Array, Array]
-    """(3,) each, of the manipulated part, of the environment part: normals, or axes."""
+    """(3,) each, of the manipulated and of the environment part: normals, or axes of round faces."""
     middles: tuple[Array, Array]
-    """(3,) each, [m]."""
+    """(3,) each, [m], in the same order."""
     reach_m: float
-    """How far apart the middles of faces that touch may be: half the larger face."""
+    """Largest distance of the middles of touching faces: half the size of the larger face."""
     lie: _Lie = "opposite"
     seated: bool = False
-    """Whether the middles are the same point."""
+    """Whether the middles coincide, as those of a seated cone."""
 
 
 class _Condition(NamedTuple):
-    """What one contact says of the pose T of an operation: R own = way, and u . (R at + t - there) = 0 for some u."""
+    """The constraint of one contact on the pose (R, t) of an operation: R own = way, u . (R at + t - there) = 0 for
+    some u.
+    """
 
     own: Array
     """A normal or an axis in the frame of the main part, (3,)."""
     at: Array
-    """The middle of the face there, (3,), [m]."""
+    """The middle of its face, in the frame of the main part, (3,), [m]."""
     way: Array
-    """The opposite of the other normal, or the other axis, (3,), world."""
+    """The direction that `own` must have: the opposite of the other normal, or the other axis, (3,), world."""
     there: Array
     """The middle of the other face, (3,), world, [m]."""
     beside: Array
@@ -60,7 +62,7 @@ class _Condition(NamedTuple):
     """Whether the main part has the manipulated face."""
 
     def exact(self, R: Array) -> Array:
-        """The directions u in which the middles are in one place, (k, 3), world."""
+        """The directions u in which the two middles must coincide, (k, 3), world, at orientation R, (3, 3)."""
         if self.ends.seated:
             return np.eye(3)
         if self.ends.lie == "along":
@@ -69,16 +71,16 @@ class _Condition(NamedTuple):
 
 
 class InferredPoses(NamedTuple):
-    """Poses of which some were inferred."""
+    """The result of `infer_poses`."""
 
     poses: Array
     """(n, 4, 4)."""
     baseless: tuple[int, ...]
-    """Operations of which no contact says anything: they are as they were given."""
+    """Operations without any contact to infer from; their poses are as given."""
 
 
 def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredPoses:
-    """The poses of an observation, those of `unknown` operations, counted from 0, replaced by what contacts say."""
+    """Replace the poses of `unknown` operations, counted from 0, by what their contacts imply."""
     poses = np.array(observation.poses)
     left = set(unknown)
     baseless = list[int]()
@@ -88,6 +90,7 @@ def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredP
             poses[k] = np.eye(4)
     while left:
         conditions = {k: _conditions(observation.assembly, start, poses, k, left) for k in sorted(left)}
+        # The most constrained operation first, since its pose then constrains the others.
         k = max(conditions, key=lambda k: (_rank(conditions[k]), len(conditions[k]), -k))
         if conditions[k]:
             poses[k] = _place(conditions[k], poses[k])
@@ -99,7 +102,7 @@ def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredP
 
 @remember
 def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
-    """The faces of every contact, in the order of `relations()`; None of contacts of sheets that add nothing.
+    """The faces of every contact, in the order of `relations()`; None for contacts of sheets that add nothing.
 
     Args:
         assembly: As `project_round_faces` makes it.
@@ -117,13 +120,17 @@ def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
 
 
 def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
+    """The faces of a contact of two flat faces or sheets."""
     a, b = (assembly.face(of) for of in contact)
     reach = max(float(np.ptp(face.outline, axis=0).max()) for face in (a, b)) / 2
     return Ends((a.normal, b.normal), (a.outline.mean(axis=0), b.outline.mean(axis=0)), reach)
 
 
 def _round_ends(assembly: Assembly, contact: Contact, stated: Contact) -> Ends | None:
-    """What a contact of sheets tells of that of round faces; of cones the one that says where they sit tells all."""
+    """The faces of a contact of sheets that stands for one of round faces (`stated`).
+
+    For cones only the sheet that states the seat is used; None for the others.
+    """
     kind = classify_contact(*map(assembly.face_of, stated))
     ends = _flat_ends(assembly, contact)
     own = {of.part: of.face for of in stated}
@@ -138,7 +145,12 @@ def _round_ends(assembly: Assembly, contact: Contact, stated: Contact) -> Ends |
 
 
 def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Collection[int]) -> list[_Condition]:
-    """What contacts say of operation k that depend on no other operation of those left."""
+    """The constraints on operation k from contacts that depend on no other unknown operation, `left`.
+
+    Args:
+        start: Start poses of the parts, (p, 4, 4).
+        poses: Current poses of the operations, (n, 4, 4).
+    """
     p = len(start)
     stack = np.concatenate([start, poses])
     conditions = list[_Condition]()
@@ -161,21 +173,25 @@ def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Co
 
 
 def _rank(conditions: Sequence[_Condition]) -> int:
-    """In how many directions normals look."""
+    """Number of independent directions in the constraints, 0 to 3."""
     return _directions(np.array([condition.own for condition in conditions])) if conditions else 0
 
 
 def _directions(own: Array) -> int:
-    """How many directions these are, (k, 3), the same within a few degrees."""
+    """Number of independent directions among unit vectors, (k, 3), within a few degrees."""
     return int((np.linalg.svd(own, compute_uv=False) > _APART).sum())
 
 
 def _place(conditions: Sequence[_Condition], seen: Array) -> Array:
-    """The pose that agrees best with what is stated; what is not said of its orientation is as it was observed."""
+    """The pose that best satisfies the constraints; unconstrained rotations stay as observed.
+
+    Args:
+        seen: The observed pose, (4, 4).
+    """
     T = np.eye(4)
     T[:3, :3] = R = _turn(conditions, seen[:3, :3])
-    # The position minimises the squares of what each condition leaves: exact along the directions that a plane says,
-    # and as vague as the face is large across them.
+    # The position minimises the squared residuals of the constraints: weight 1 / _PLANE_M^2 in the directions that a
+    # contact fixes, weight 1 / reach^2 in all directions for the distance of the middles.
     exact = [condition.exact(R) for condition in conditions]
     A = np.zeros((3, 3))
     b = np.zeros(3)
@@ -192,9 +208,9 @@ def _place(conditions: Sequence[_Condition], seen: Array) -> Array:
 
 
 def _across(ways: Array) -> Array:
-    """The projection (3, 3) onto the directions in which planes say where a point is.
+    """The projection, (3, 3), onto the directions in which planes determine a point.
 
-    Planes that are parallel but for noise meet somewhere, far away; that says nothing.
+    Nearly parallel planes intersect far away, so small singular values are dropped.
     """
     _, w, Vt = np.linalg.svd(ways)
     known = Vt[: np.count_nonzero(w > _APART * w[0])]
@@ -202,7 +218,9 @@ def _across(ways: Array) -> Array:
 
 
 def _turn(conditions: Sequence[_Condition], seen: Array) -> Array:
-    """(3, 3): normals oppose, axes point the way that fits best; what is left of a shaft on a plane turns the least."""
+    """The orientation, (3, 3): normals oppose and axes align; the rest is turned as little as possible from the
+    observed one.
+    """
     sure = [condition for condition in conditions if condition.ends.lie != "across"]
     R = _choose_senses(sure, seen) if sure else seen
     if len(sure) == len(conditions) or _rank(sure) > 1:
@@ -218,14 +236,16 @@ def _turn(conditions: Sequence[_Condition], seen: Array) -> Array:
 
 
 def _beside(direction: Array, way: Array) -> Array:
-    """The nearest direction across another one, (3,)."""
+    """The unit vector perpendicular to `way` that is nearest to a direction, (3,)."""
     across = direction - (direction @ way) * way
     size = np.sqrt(across @ across)
     return across / size if size > _APART else np.asarray(np.linalg.svd(way[None])[2][1])
 
 
 def _choose_senses(conditions: Sequence[_Condition], seen: Array) -> Array:
-    """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was observed."""
+    """The orientation, (3, 3), with the best senses of all axes; ties go to the one nearest to the observed
+    orientation.
+    """
     own, way = (np.array([getattr(condition, name) for condition in conditions]) for name in ("own", "way"))
     axes = [i for i, condition in enumerate(conditions) if condition.ends.lie == "along"]
     if not axes:
@@ -241,7 +261,11 @@ def _choose_senses(conditions: Sequence[_Condition], seen: Array) -> Array:
 
 
 def _fit(own: Array, way: Array, beside: Array, seen: Array) -> Array:
-    """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
+    """The orientation, (3, 3), for which R own = way fits best.
+
+    If all directions are parallel, the turn about them is free: a multiple of 90 degrees relative to the other part is
+    taken, the nearest to the observed one.
+    """
     # One direction leaves the turn about it: of the quarter turns of the other part the nearest one is taken.
     rank = _directions(own)
     if rank == 1:

@@ -1,4 +1,4 @@
-"""What a batch of observations of one assembly asks of the solver: equations, inequalities, noise."""
+"""Input of the solver for a batch of observations of one assembly: equations, inequalities and noise."""
 
 from __future__ import annotations
 
@@ -30,59 +30,60 @@ from apo_bench.geometry import Array, remember
 
 
 class _Demands(NamedTuple):
-    """What is asked of the c contacts of an assembly."""
+    """Which of the c contacts of an assembly are equations, with distances and covariances from play."""
 
     exact: NDArray[np.bool_]
     """(c,): contacts that are equations; the others are inequalities."""
     all_exact: bool
     """Whether all of them are equations."""
     low: Array
-    """(c,), [m]: the least distance of each contact; so is `high` the largest."""
+    """(c,), [m]: the least allowed distance of each contact."""
     high: Array
+    """(c,), [m]: the largest allowed distance of each contact."""
     plane: Array
-    """(c, 4): planes shifted to where equations are asked to be."""
+    """(c, 4): planes of Eq. 1, shifted by the distance at which an equation must hold."""
     slack_m: Array | None
-    """(3 c,): the standard deviation of each equation that play of parts that fit leaves, [m]; None: nowhere any."""
+    """(3 c,): the standard deviation of each equation from play, [m]; None without play."""
     play_covariance: Array | None
-    """(3 c, 3 c): the covariance of the equations that play causes, [m^2]; None: none."""
+    """(3 c, 3 c): the covariance of the equations from play, [m^2]; None: none."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """b observations of one assembly, with the same start poses and play, and what is asked of its c contacts."""
+    """A batch of b observations of one assembly with n operations and c contacts, the same start poses and play."""
 
     observations: tuple[Observation, ...]
     poses: Array
-    """(b, n, 4, 4), what was observed."""
+    """(b, n, 4, 4), the observed poses, world, [m]."""
     L: Array
-    """(b, n, 6, 6), or (b, n, 6, 6 n) where operations share errors."""
+    """Factor of the noise: (b, n, 6, 6), or (b, n, 6, 6 n) if operations share errors."""
     laid: ProjectedContacts
-    """The equations of every contact, planes shifted to where they are asked to be."""
+    """The equations of every contact, with shifted planes."""
     demands: _Demands
     inequalities: tuple[Inequalities, ...]
-    """Those of each observation; none if every contact is an equation."""
+    """The inequalities of each observation; empty if every contact is an equation."""
     level: float
-    """The test fails if the p-value is below."""
+    """The test fails if the p-value is below this."""
     begin: Array | None = None
-    """(b, 6 n): the correction that is begun with, in standard deviations; None stands for no correction."""
+    """(b, 6 n): the correction to start from, in standard deviations; None: none."""
 
     @property
     def observation(self) -> Observation:
-        """The first of a batch; of a batch of one, the only one.
+        """The first observation of the batch.
 
-        Of larger batches only what all have in common is read off it: `ContactCorrector.together` makes batches of one
-        where observations state tails or shared errors.
+        In larger batches use it only for what all observations have in common. Observations with tails or shared errors
+        come in batches of one (`ContactCorrector.together`).
         """
         return self.observations[0]
 
     @property
     def all_contacts(self) -> NDArray[np.bool_]:
-        """The choice of all contacts, (c,): true throughout."""
+        """The choice of all contacts, (c,)."""
         return np.ones(len(self.demands.exact), dtype=np.bool_)
 
     def only(self, i: int) -> Problem:
-        """What one of the observations asks."""
+        """The problem of observation i alone."""
         if len(self.observations) == 1:
             return self
         some = slice(i, i + 1)
@@ -97,15 +98,15 @@ class Problem:
         )
 
     def without(self, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-        """The contacts that are left without these relations or single contacts, (c,)."""
+        """The choice, (c,), of all contacts but those of these relations or single contacts."""
         return self.observation.assembly.without(dropped)
 
     def seen_gap_m(self) -> list[float]:
-        """The largest |e| of all contacts at what was observed, [m], of each observation."""
+        """The largest |e| of all contacts at the observed poses, [m], per observation."""
         return self.gaps(self.poses, self.laid.forms).max(axis=1, initial=0.0).tolist()
 
     def gaps(self, poses: Array, forms: Array | None = None) -> Array:
-        """The largest |e| of each contact, (b, c), [m], at poses (b, n, 4, 4), or how far an inequality is violated.
+        """The largest |e| of each contact, (b, c), [m], at poses (b, n, 4, 4); for an inequality its violation.
 
         Args:
             forms: (b, c, 4), n D_a^-1 D_b of each contact there, if that is known.
@@ -116,7 +117,7 @@ class Problem:
         return gaps
 
     def play_covariance(self, chosen: NDArray[np.bool_]) -> Array | None:
-        """The covariance of the equations of the contacts that are chosen, (c,), that play causes, [m^2]."""
+        """The covariance of the equations of the chosen contacts, (c,), from play, [m^2]; None: none."""
         S = self.demands.play_covariance
         if S is None or chosen.all():
             return S
@@ -124,30 +125,37 @@ class Problem:
         return S[np.ix_(rows, rows)]
 
     def slack(self, chosen: NDArray[np.bool_]) -> Array:
-        """The standard deviation of each of their equations that play of parts that fit leaves, [m]."""
+        """The standard deviation of each equation of the chosen contacts, (c,), from play, [m]."""
         slack_m = self.demands.slack_m
         return np.zeros(3 * np.count_nonzero(chosen)) if slack_m is None else slack_m[np.repeat(chosen, 3)]
 
     def among(self, chosen: NDArray[np.bool_]) -> CompactEquations:
-        """The equations of the contacts that are chosen, (c,)."""
+        """The equations of the chosen contacts, (c,)."""
         return self.laid.system if chosen.all() else self.laid.system.among(chosen)
 
     def nearest(self, chosen: NDArray[np.bool_], soft_m: Array | None = None) -> NearestPoses:
-        """The nearest poses by some of the equations, demanded or given a standard deviation each, [m]."""
+        """The nearest poses for the equations of the chosen contacts, (c,).
+
+        Args:
+            soft_m: Standard deviation of each of these equations, [m]; None: they must hold.
+        """
         return solve_batch(self.among(chosen), self.poses, self.L, soft_m, self.begin)
 
     @property
     def is_plain(self) -> bool:
-        """Whether matrices are small, contacts equations without play, and errors Gaussian, of each operation alone."""
+        """Whether several choices of contacts can be solved in one batch.
+
+        True for small matrices, equations without play, and Gaussian errors that are independent between operations.
+        """
         demands = self.demands
         gaussian = self.observation.tails is None and not self.observation.shared
         equations = demands.all_exact and demands.slack_m is None and demands.play_covariance is None
         return gaussian and equations and 6 * self.laid.system.n <= LARGEST_DENSE
 
     def nearest_by_each(self, choices: NDArray[np.bool_]) -> NearestPoses:
-        """The nearest poses of one observation by each of the choices of contacts, (k, c), as a batch of k."""
+        """The nearest poses of one observation for each choice of contacts, (k, c), as a batch of k."""
         k = len(choices)
-        # The points of a contact that is left out are zero, and so are its equations.
+        # Zero points make the equations of a contact that is left out 0 = 0.
         system = replace(self.laid.system, points=self.laid.system.points[:1] * choices[:, :, None, None])
         begin = None if self.begin is None else np.tile(self.begin[:1], (k, 1))
         poses, L = (np.tile(x[:1], (k, *[1] * (x.ndim - 1))) for x in (self.poses, self.L))
@@ -155,12 +163,11 @@ class Problem:
 
 
 def problem_of(observations: Sequence[Observation], level: float = TEST_LEVEL, at: Array | None = None) -> Problem:
-    """What observations of one assembly with flat faces ask, with the same start poses and play.
+    """Build the problem of observations of one assembly with flat faces, the same start poses and play.
 
     Args:
         level: The test fails if the p-value is below.
-        at: Poses, (b, n, 4, 4), at which vertices are laid onto the other face of their contact and which the solver
-            begins with; None stands for those that were observed.
+        at: Poses, (b, n, 4, 4), at which vertices are projected and the solver starts; None: the observed poses.
 
     Raises:
         InputError: A covariance is not positive definite; several operations share errors.
@@ -186,7 +193,7 @@ def problem_of(observations: Sequence[Observation], level: float = TEST_LEVEL, a
 
 @remember
 def _demands(assembly: Assembly, play_m: float) -> _Demands:
-    """What is asked of the contacts of an assembly whose parts fit with this play, [m]."""
+    """The demands on the contacts of an assembly whose parts fit with this play, [m]."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
     plane = np.array(find_contact_pattern(assembly).plane)
@@ -204,7 +211,7 @@ def _demands(assembly: Assembly, play_m: float) -> _Demands:
 
 
 def _factors(observations: Sequence[Observation]) -> Array:
-    """L of observations whose operations err each by itself, (b, n, 6, 6)."""
+    """L of observations with independent operations, (b, n, 6, 6)."""
     try:
         covariances = np.concatenate([observation.covariance for observation in observations])
         L = np.linalg.cholesky(covariances).reshape(len(observations), -1, 6, 6)
@@ -216,7 +223,7 @@ def _factors(observations: Sequence[Observation]) -> Array:
 
 
 def seen_system(observation: Observation) -> CompactEquations:
-    """The equations of every contact, each vertex where it was observed."""
+    """The equations of every contact, with vertices projected at the observed poses."""
     return build_compact_equations(
         build_contact_equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
     )

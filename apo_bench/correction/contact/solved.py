@@ -1,4 +1,4 @@
-"""The nearest poses by some of the contacts, with all that `contact` states of them: gaps, rank, covariance, test."""
+"""Nearest poses for a choice of contacts, with gaps, rank, covariance and test."""
 
 from collections.abc import Sequence
 from math import cos, radians
@@ -22,44 +22,47 @@ from apo_bench.correction.solvers import (
 from apo_bench.geometry import Array
 
 FAR_DEG = 45.0
-"""A pose that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none
-turned a pose by more than 33 degrees; every one that was longer than the truth, at 25 and 40, did by 56 or more."""
+"""Rotation of a pose by the correction beyond which a local minimum is likely. Of 320 corrections at 8 mm and degrees,
+over the eight scenarios, none turned a pose by more than 33 degrees. Every one that was longer than the truth, at 25
+and 40, did by 56 or more."""
 _FAR = 1.0 + 2.0 * cos(radians(FAR_DEG))
-"""The trace of the matrix of such a rotation."""
+"""The trace of a rotation matrix by that angle."""
 
 
 class Solved(NamedTuple):
-    """What some contacts ask of one observation."""
+    """The solution of one observation for some contacts."""
 
     poses: Array
-    """(n, 4, 4)."""
+    """(n, 4, 4), world, [m]."""
     z: Array
     """(6 n,): the correction in standard deviations."""
     at_rest: bool
+    """Whether the solver converged."""
     finite: bool
+    """Whether all numbers stayed finite."""
     trace: Sequence[tuple[float, float]]
     """As of `NearestPoses`."""
     test: Consistency
     gaps: Array
-    """(c,): the largest |e| of each contact at the poses, [m]; or how far an inequality is violated."""
+    """(c,): the largest |e| of each contact at the poses, [m]; for an inequality its violation."""
     worst_m: float
-    """The largest of those."""
+    """The largest gap of all contacts, [m]."""
     kept_m: float
-    """The largest of contacts that were asked for."""
+    """The largest gap of the contacts that were solved for, [m]."""
     away: bool
-    """Whether faces of a contact do not look at each other there."""
+    """Whether the faces of a contact do not oppose at the poses."""
     rank: int
-    """Directions that the equations fix there."""
+    """Directions that the equations fix at the poses."""
     covariance: Array | None
-    """(n, 6, 6), of the body twists there, [m, rad]; None of very many operations."""
+    """(n, 6, 6), of the body twists at the poses, [m, rad]; None for very many operations."""
     far: bool
-    """Whether a pose is turned so far that a local minimum is to be feared."""
+    """Whether a pose is turned by more than `FAR_DEG`."""
 
 
 def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
-    """The nearest poses of each observation by the contacts that are `kept`, (c,), and the test of the correction.
+    """The nearest poses of each observation for the contacts that are `kept`, (c,), with the test of the correction.
 
-    Contacts that contradict each other have no nearest poses; those that share the contradiction out are returned.
+    Contradictory contacts have no consistent poses; then the poses share the contradiction out by least squares.
     """
     chosen = kept & problem.demands.exact
     nearest = problem.nearest(chosen)
@@ -78,7 +81,7 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
 
 
 def run_tests(problem: Problem, choices: NDArray[np.bool_]) -> list[Consistency]:
-    """The test of one observation by each of the choices of contacts, (k, c)."""
+    """The test of one observation for each choice of contacts, (k, c)."""
     tests: list[Consistency | None] = [None] * len(choices)
     if problem.is_plain and len(choices):
         nearest = problem.nearest_by_each(choices)
@@ -90,6 +93,7 @@ def run_tests(problem: Problem, choices: NDArray[np.bool_]) -> list[Consistency]
 
 
 def _run_test(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
+    """The test of one observation for one choice of contacts, (c,)."""
     if not problem.demands.exact[kept].all():
         return solve(problem, kept)[0].test
     nearest = problem.nearest(kept)
@@ -97,7 +101,9 @@ def _run_test(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
 
 
 def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
-    """How hard each contact pulls at the poses of one observation, (c,), by the multipliers of its equations."""
+    """The squared multipliers of the equations of each contact of one observation, (c,): how much it forces the
+    poses.
+    """
     chosen = kept & problem.demands.exact
     soft = np.hypot(problem.slack(chosen), CONTRADICTION_M)
     multipliers = np.zeros((len(chosen), 3))
@@ -106,7 +112,7 @@ def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
 
 
 def turned_far(observed: Array, poses: Array) -> NDArray[np.bool_]:
-    """Whether a correction turns a pose so far that a local minimum is to be feared: (b, n, 4, 4) -> (b,)."""
+    """Whether a correction turns any pose by more than `FAR_DEG`: observed and corrected (b, n, 4, 4) -> (b,)."""
     # The trace of R_seen^t R is 1 + 2 cos of the angle between them.
     traces = np.einsum("bnij,bnij->bn", observed[:, :, :3, :3], poses[:, :, :3, :3])
     return np.asarray(traces.min(axis=1, initial=3.0) < _FAR)
@@ -115,7 +121,7 @@ def turned_far(observed: Array, poses: Array) -> NDArray[np.bool_]:
 def _describe(
     problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses, chi_square: list[float]
 ) -> list[Solved]:
-    """What is to say of each of the nearest poses, given the squared lengths of corrections, (b,)."""
+    """The `Solved` of each observation of a batch, given nearest poses and squared lengths of corrections, (b,)."""
     all_kept = bool(kept.all())
     poses = nearest.poses
     forms = nearest.forms if all_kept and problem.demands.all_exact else problem.laid.system.forms(poses)
@@ -136,11 +142,11 @@ def _describe(
 
 
 def _describe_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses) -> Solved:
-    """The same of one observation whose contacts contradict each other, or that has walls or tails.
+    """The `Solved` of one observation with contradictory contacts, inequalities or tails.
 
-    Active inequalities count like equations: given which they are, the squared length is chi-square
-    distributed with that many degrees of freedom more (Shapiro, "Towards a unified theory of inequality constrained
-    testing", 1988), if they are active at the truth too, and shorter otherwise.
+    Active inequalities count like equations. Given which ones are active, the squared length is chi-square distributed
+    with so many more degrees of freedom, if they are active at the truth too, and shorter otherwise (Shapiro, "Towards
+    a unified theory of inequality constrained testing", 1988).
     """
     exact = problem.demands.exact
     chosen = kept & exact

@@ -1,7 +1,7 @@
-"""The squared length of a correction in standard deviations, chi-square, and its test.
+"""Chi-square of a correction: its squared length in standard deviations, and the test of that.
 
-Where contacts contradict each other or parts fit with play, equations may be off: what they are off by, in standard
-deviations of its own, counts with z.
+Where contacts contradict each other or parts fit with play, equations need not hold exactly. Their residuals, in
+standard deviations of their own, are added to the squared length.
 """
 
 import numpy as np
@@ -19,9 +19,9 @@ from apo_bench.geometry import Array
 
 
 def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses) -> tuple[Array, NDArray[np.bool_]]:
-    """Squared lengths of corrections, (b,), and whether those are what the test asks for, (b,), as they stand.
+    """Squared lengths of corrections, (b,), and whether each may be tested as it is, (b,).
 
-    They are if the contacts hold and what play leaves needs no further solution; else it is `relaxed_chi_square`.
+    It may if the contacts hold and play needs no further solution; otherwise use `relaxed_chi_square`.
     """
     holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= CONTRADICTION_M)
     S = problem.play_covariance(chosen)
@@ -36,8 +36,8 @@ def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPos
 def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses) -> tuple[float, int]:
     """The squared length of one correction and its degrees of freedom, the rank.
 
-    Where contacts contradict each other, or fit with play, the solver runs once more, with a standard deviation for
-    each equation, and the squares of what is left of the equations, in that unit, are added.
+    If contacts contradict each other or fit with play, the solver runs again with a standard deviation for each
+    equation. The squared residuals of the equations, in that unit, are then added.
     """
     degrees = compute_jacobian_rank(nearest.Jt[0])
     if not nearest.finite[0]:
@@ -60,9 +60,9 @@ def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: Nea
 def chi_square_test(
     problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses, chi_square: float, degrees: int
 ) -> Consistency:
-    """The test of one squared length with its degrees of freedom, by the chi-square distribution.
+    """The test of a squared length with its degrees of freedom, by the chi-square distribution.
 
-    Where errors have tails it is by draws, of which only dense matrices are made.
+    If errors have tails it is a Monte Carlo test, for dense matrices only.
     """
     p = p_value(chi_square, degrees)
     tails = problem.observation.tails

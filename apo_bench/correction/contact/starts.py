@@ -1,9 +1,9 @@
-"""Where else to begin: what was observed may lead to a solution that is none, or to one that is longer than need be.
+"""Other starts of the solver, for cases in which the observed poses lead to no solution or to a distant one.
 
-Poses that are turned far see equations that bend: the solver may end with faces that look the same way, with contacts
-that do not hold, or in a local minimum. Other starts come from contacts, which state how a part must lie on others, and
-from symmetry: a part that looks the same when it is turned may have been observed turned. Of all solutions the one
-nearest to what was observed is taken, in the metric of the noise.
+Far from the observed poses the equations are strongly nonlinear. The solver may end with faces that look the same way,
+with open contacts, or in a local minimum. Other starts come from contacts, which state how a part lies on others, and
+from symmetries, since a part may have been observed turned. Of all solutions the one nearest to the observation is
+taken, in the metric of the noise.
 """
 
 from collections.abc import Collection, Iterator
@@ -26,18 +26,19 @@ from apo_bench.correction.solvers import (
 from apo_bench.geometry import Array, find_symmetries
 
 _SHORTER = 1.0 - 1e-6
-"""Squared lengths of two corrections differ if their ratio is below: the rest is rounding."""
+"""One squared length is shorter than another one if their ratio is below this; the rest is rounding."""
 _MOST = 8
-"""Operations of which starts are made."""
+"""Most operations for which starts are made."""
 
 
 def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
-    """A problem that begins where the nearest solution is found, and that; both as given if no other start is better.
+    """The problem with the start that leads to the nearest solution, and that solution; unchanged if no start is
+    better.
 
-    Where faces look at each other nearby and contacts do not hold, they contradict each other wherever one begins.
+    No other starts are tried if no pose is turned far and the faces oppose: open contacts then contradict each other.
 
     Args:
-        first: What comes of beginning with what was observed.
+        first: The solution from the observed poses.
     """
     observed = problem.poses[0]
     usable = _holds(problem, first)
@@ -68,28 +69,31 @@ def describe_turns(problem: Problem, poses: Array) -> str:
 
 
 def _holds(problem: Problem, solved: Solved) -> bool:
-    """Whether every contact holds with faces that look at each other."""
+    """Whether the solver converged, every contact holds, and faces in contact oppose."""
     holds = solved.at_rest and solved.finite and solved.worst_m <= problem.observation.gap_m
     return bool(holds and _faces_oppose(problem, solved.poses))
 
 
 def _faces_oppose(problem: Problem, *poses: Array) -> bool:
-    """Whether the faces of every contact look at each other, at each of some poses."""
+    """Whether the faces of every contact oppose, at each of some poses, (n, 4, 4)."""
     return not find_faces_away(problem.observation.assembly, problem.observation.start, np.array(poses)).any()
 
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
-    """Whether contacts also hold with vertices laid where the poses are: seen edge-on, they lie on one line."""
+    """Whether contacts also hold with vertices projected at the solution.
+
+    Vertices that were projected onto a face observed edge-on lie on one line and constrain too little.
+    """
     return find_largest_residual(_begun_at(problem, solved.poses).gaps(solved.poses[None])) <= problem.observation.gap_m
 
 
 def _begun_at(problem: Problem, poses: Array) -> Problem:
-    """The same, begun with poses, (n, 4, 4), and vertices laid there."""
+    """The problem with start and projected vertices at these poses, (n, 4, 4)."""
     return problem_of(problem.observations, problem.level, poses[None])
 
 
 def _starts(problem: Problem, first: Solved) -> Array:
-    """Poses to begin with, (b, n, 4, 4)."""
+    """Start poses to try, (b, n, 4, 4): doubtful operations inferred from contacts, or turned by symmetries."""
     observation = problem.observation
     doubted = _find_doubtful(problem, first)
     n = len(observation.poses)
@@ -100,12 +104,13 @@ def _starts(problem: Problem, first: Solved) -> Array:
             poses = np.array(observation.poses)
             poses[k] = poses[k] @ g
             turned.append(poses)
+    # turned[0] is the observation: a turn is tried only if fewer faces then look the same way.
     away = find_faces_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
     return np.array([*starts, *(poses for poses, count in zip(turned, away, strict=True) if count < away[0])])
 
 
 def _find_doubtful(problem: Problem, first: Solved) -> Collection[int]:
-    """The operations that may be far off: all, or those with a part in most contacts that do not hold."""
+    """Operations that may be far off: all of a few, else those with most violated contacts, at most `_MOST`."""
     observation = problem.observation
     n = len(problem.observation.poses)
     if n <= _MOST:
@@ -119,7 +124,9 @@ def _find_doubtful(problem: Problem, first: Solved) -> Collection[int]:
 
 
 def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
-    """Poses, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
+    """Yield consistent poses, (n, 4, 4), with opposing faces, found from the starts, the nearest to the observation
+    first.
+    """
     observation = problem.observation
     (b, n, *_) = starts.shape
     L = factor_covariance(observation.covariance)

@@ -1,7 +1,7 @@
-"""Which relation to suspect if the test of a correction fails.
+"""Ranking of the relations that may be wrong if the test of a correction fails.
 
-Everything fits once a relation that is wrong is left out, so the relations are ranked by how well the rest fits without
-them. More than one may do: they form the ambiguity set, and no observation distinguishes them.
+Each relation is left out in turn, and the test of the rest is repeated: without the wrong relation everything fits.
+Several relations may qualify; they form the ambiguity set, which no observation can resolve.
 """
 
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.contact.solved import pull, run_tests
 
 MOST_SUSPECTS = 64
-"""Relations that are left out in turn; of more, those that pull hardest."""
+"""Most relations that are left out in turn; of more, those with the largest multipliers."""
 
 
 def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
-    """Every relation that has contacts that are `kept`, (c,), left out in turn; the most suspect first.
+    """The relations with contacts that are `kept`, (c,), ranked by the test without them, the most suspect first.
 
-    Of more relations than `MOST_SUSPECTS` only those that pull hardest are tried.
+    Of more than `MOST_SUSPECTS` relations only those with the largest multipliers (`pull`) are tried.
     """
     arcs = problem.observation.assembly.arcs()
     considered = [i for i, arc in enumerate(arcs) if kept[list(arc)].any()]
@@ -32,13 +32,16 @@ def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
 
 
 def contact_suspects(problem: Problem, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
-    """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
+    """The contacts of one relation, `R3`, ranked likewise; each is called `R3: stick.py on castle1.spy`."""
     single = contacts_of(problem.observation.assembly, relation)
     return _rank(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
 
 
 def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]:
-    """The contacts of one relation, `R3`, by their names, `R3: stick.py on castle1.spy`: numbers in `relations()`."""
+    """Names of the contacts of one relation, `R3: stick.py on castle1.spy` -> their numbers in `relations()`.
+
+    A contact of round faces has several numbers, since it stands for several contacts of sheets.
+    """
     relations = assembly.relations()
     together = dict[Contact, tuple[int, ...]]()
     for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
@@ -50,7 +53,10 @@ def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]
 def _rank(
     problem: Problem, kept: NDArray[np.bool_], groups: Sequence[tuple[str, tuple[int, ...]]]
 ) -> tuple[Suspect, ...]:
-    """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
+    """Leave out each named group of contacts in turn and rank the groups, the most suspect first.
+
+    The order is by p-value; where that underflows, by the normalised excess of chi-square.
+    """
     relations = problem.observation.assembly.relations()
     ranked = list[Suspect]()
     rest = np.tile(kept, (len(groups), 1))

@@ -1,1 +1,1 @@
-"""Correction when some observations are grossly wrong, or missing."""
+"""Correction of observations with outliers or missing operations: the corrector `contact-robust`."""

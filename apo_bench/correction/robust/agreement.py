@@ -1,4 +1,4 @@
-"""What contacts say of a hypothesis that is not solved: they are linearised once, at what is assumed."""
+"""Cheap scores of hypotheses without solving them: contacts are linearised once, at the assumed poses."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,13 +22,16 @@ from apo_bench.correction.robust.hypotheses import (
 from apo_bench.correction.solvers import compute_jacobian_rank, factor_noise, linearise_by
 
 _LEVER_M = 0.1
-"""What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
+"""Lever arm of the second-order error: a rotation by an angle a moves points about a^2 times this beyond linear,
+[m]."""
 
 
 def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assumed: Observation) -> float:
-    """About what `SolvedHypothesis.badness` will be, if there is a solution.
+    """Estimate `SolvedHypothesis.badness` of a hypothesis, in case it has a solution.
 
     Args:
+        states: The assumed state of each operation.
+        dropped: Relations assumed to be wrong.
         assumed: The `assumed_observation` of the states.
     """
     left_out = untrusted_operations(states)
@@ -44,7 +47,11 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assum
 
 
 def _beyond_linear(assumed: Observation, unknown: Sequence[int]) -> float:
-    """How far points move beyond what is linear if parts are turned by their noise, [m]."""
+    """How far points may move beyond the linear model if parts are rotated by their noise, [m].
+
+    Args:
+        unknown: Operations whose poses are inferred; they do not count.
+    """
     known = np.delete(assumed.covariance, unknown, axis=0)
     turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
     return float(turned * turned * _LEVER_M)
@@ -52,7 +59,7 @@ def _beyond_linear(assumed: Observation, unknown: Sequence[int]) -> float:
 
 @final
 class ContactAgreement:
-    """How well contacts agree that none of some operations has a part in, linearised once at what was observed."""
+    """Tests how well the contacts agree that do not depend on some operations, linearised once at the assumed poses."""
 
     def __init__(self, case: Case, states: States) -> None:
         seen = assumed_observation(case, states)
@@ -70,7 +77,12 @@ class ContactAgreement:
         self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))
 
     def agreement(self, left_out: Sequence[int], contacts: Sequence[int] = ()) -> float:
-        """The p-value of the test of the other contacts."""
+        """The p-value of the test of the remaining contacts.
+
+        Args:
+            left_out: Operations; contacts that depend on one of them are left out.
+            contacts: Contacts to leave out too, numbers in `relations()`.
+        """
         kept = self._kept(left_out, contacts)
         if p_value(self._alone[kept].max(initial=0.0), 3 * len(kept)) == 0.0:
             return 0.0
@@ -78,14 +90,20 @@ class ContactAgreement:
         return p_value(self._square(rows), compute_jacobian_rank(self._Jt[:, rows]))
 
     def disagreement(self) -> float:
-        """The squared length of what all that is assumed leaves, in standard deviations."""
+        """The squared length of the residuals of contacts that depend on no inferred operation, in standard
+        deviations.
+        """
         return self._square(np.repeat(self._kept((), ()), 3))
 
     def _kept(self, left_out: Sequence[int], contacts: Sequence[int]) -> NDArray[np.bool_]:
+        """Which contacts remain, (c,): not in `contacts`, and dependent on no operation that is left out or
+        inferred.
+        """
         kept = ~self._uses[:, [*left_out, *self._unknown]].any(axis=1)
         kept[list(contacts)] = False
         return np.asarray(kept)
 
     def _square(self, rows: NDArray[np.bool_]) -> float:
+        """The squared length of the residuals of some equations, (3 c,) booleans, in standard deviations."""
         e = self._e[rows]
         return float(e @ np.linalg.solve(self._S[np.ix_(rows, rows)], e))

@@ -1,9 +1,17 @@
-"""What may be assumed of one view, and how likely that is before contacts count.
+"""Prior model of observations: the possible states of one view, and how likely each is before contacts count.
 
-A view is an inlier, seen with the stated noise; broad, seen with some times that; shifted, too near or too far;
-flipped, turned as a part that nearly looks the same after that turn may be; swapped with that of another operation;
-displaced together with views of neighbours; stale, where the part was before; or gross, anywhere. The last two say
-nothing of the pose.
+A view is one observation of an operation. Its state, a belief, is one of:
+
+- inlier: noise as stated;
+- broad: noise several times as large as stated;
+- shifted: too near or too far;
+- flipped: turned as a part may be that nearly looks the same after that turn;
+- swapped: exchanged with the view of another operation;
+- displaced: displaced together with the views of neighbouring operations;
+- stale: where the part was before;
+- gross: anywhere.
+
+Stale and gross views tell nothing of the pose. "Surprise" is -2 log of a probability.
 """
 
 from collections.abc import Sequence
@@ -16,62 +24,69 @@ from apo_bench.assembly import OutlierModel
 from apo_bench.geometry import Array, copy_frozen, pose
 
 INLIER = 0
+"""Noise as stated."""
 BROAD = 1
+"""Noise `OutlierModel.times` as large as stated."""
 GROSS = 2
+"""Anywhere."""
 SHIFTED = 3
+"""Too near or too far."""
 STALE = 4
+"""Where the part was before."""
 DISPLACED = 5
+"""Displaced together with neighbouring operations."""
 FLIPPED = 6
-"""By the first of the turns of its part; the next number by the next one. Swapped are below 0, see `swapped_with`."""
+"""Turned by the first approximate symmetry of its part; FLIPPED + i: by symmetry i. Negative: see `swapped_with`."""
 State = tuple[int, ...]
-"""One of these for each view of an operation; empty if it was never seen."""
+"""The belief of each view of one operation; empty if the operation was never observed."""
 States = tuple[State, ...]
-"""Those of the views of each operation."""
+"""The state of every operation."""
 SHIFT_M = 0.04
-"""Standard deviation of what is too near or too far, [m]."""
+"""Standard deviation of the distance error of a shifted view, [m]."""
 VIEW = copy_frozen(np.diag(np.repeat([0.02, np.radians(5.0)], 3) ** 2))
-"""(6, 6), of what displaces several operations together, about their middle, [m, rad]."""
+"""Covariance of a displacement that several operations share, about their mean position, (6, 6), [m, rad]."""
 ROOM = copy_frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
-"""(6, 6): a Gaussian as dense in its middle as poses anywhere in half a metre, turned anyhow, are; [m, rad]."""
+"""Covariance of a Gaussian that is as dense at its centre as poses anywhere in half a metre, of any rotation, (6, 6),
+[m, rad]."""
 _SURE_OF_RATE = 5.0
-"""The rate of gross observations that is stated counts like so many operations."""
+"""Number of operations that the stated rate of gross observations counts for as prior evidence."""
 
 
 class Sighting(NamedTuple):
-    """An operation as it was observed once."""
+    """One view: a single observation of one operation."""
 
     goal: Array
-    """(4, 4)."""
+    """The observed pose of the main part, (4, 4), world, [m]."""
     covariance: Array
     """(6, 6), [m, rad]."""
     flips: Array
-    """(m, 4, 4), body displacements after which its part nearly looks the same."""
+    """(m, 4, 4), approximate symmetries of the part (`find_approximate_symmetries`)."""
     before: tuple[Array, Array] | None = None
-    """Where its part was before, (4, 4), and the covariance of that, (6, 6); None if that is not known."""
+    """Pose of the part before the operation, (4, 4), and its covariance, (6, 6); None if unknown."""
     ray: Array | None = None
-    """(3,), the ray on which it was observed, in the frame of the part; None if that is not known."""
+    """Direction from the camera to the part, unit vector, (3,), frame of the part; None if unknown."""
     others: tuple[int, ...] = ()
-    """Operations whose view may have been exchanged for this one."""
+    """Operations whose view may have been exchanged with this one."""
 
 
 def swapped_with(k: int) -> int:
-    """The belief that a view is that of another operation; and back."""
+    """The belief, a negative number, that a view is swapped with that of operation k; also its inverse."""
     return -1 - k
 
 
 def says_nothing(belief: int) -> bool:
-    """Whether a view that is assumed so tells nothing of the pose."""
+    """Whether a view with this belief tells nothing of the pose."""
     return belief in (GROSS, STALE)
 
 
 def alternatives(view: Sighting) -> list[int]:
-    """What may be assumed of a view by itself."""
+    """The beliefs that are possible for a view by itself, without other operations."""
     stale = [] if view.before is None else [STALE]
     return [INLIER, BROAD, GROSS, SHIFTED, *stale, *range(FLIPPED, FLIPPED + len(view.flips))]
 
 
 def interpret_view(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Array]:
-    """What a view that is assumed so says of the pose: a pose, (4, 4), and its covariance, (6, 6)."""
+    """The true pose that a view with some belief indicates, (4, 4), and the covariance of its body twist, (6, 6)."""
     if belief == BROAD:
         return view.goal, view.covariance * model.times**2
     if belief == SHIFTED:
@@ -89,7 +104,7 @@ def interpret_view(view: Sighting, belief: int, model: OutlierModel) -> tuple[Ar
 
 
 def share(view: Sighting, belief: int, model: OutlierModel) -> float:
-    """How often a view is so, relative to how often it is an inlier."""
+    """Prior probability of a belief of a view, relative to that of an inlier."""
     inlier = 1.0 - model.gross - model.broad
     flips = len(view.flips)
     kinds = {SHIFTED: model.shift, STALE: model.stale if view.before is not None else 0.0}
@@ -108,22 +123,25 @@ def share(view: Sighting, belief: int, model: OutlierModel) -> float:
 
 
 def log_volume(covariance: Array) -> float:
-    """-2 log of the density of a Gaussian in its middle."""
+    """-2 log of the density of a Gaussian with this covariance at its centre."""
     return float(np.linalg.slogdet(2.0 * np.pi * covariance)[1])
 
 
 def unlikelihood(apart: Array, covariance: Array) -> float:
-    """-2 log of how dense a Gaussian is at a twist, (6,), relative to poses that may be anywhere."""
+    """-2 log of the density of a Gaussian at a twist, (6,), relative to that of poses anywhere (`ROOM`)."""
     square = float(apart @ np.linalg.solve(covariance, apart))
     return square + log_volume(covariance) - log_volume(ROOM)
 
 
 def surprise(views: Sequence[Sighting], state: State, model: OutlierModel) -> float:
-    """-2 log of how likely a state of the views of one operation is, relative to inliers; and of the views, as far as
-    that does not depend on the pose."""
+    """-2 log of the probability of the state of the views of one operation, relative to inliers.
+
+    The density of stale views and of repeated false views is included, since that does not depend on the pose.
+    """
     total = 0.0
     for j, (view, belief) in enumerate(zip(views, state, strict=True)):
         chance = share(view, belief, model)
+        # After a false view, a later one repeats the error with probability `model.repeat`.
         false = [i for i in range(j) if is_false(state[i])]
         if false:
             again = np.mean([_alike(views[i], state[i], view, belief) for i in false])
@@ -136,7 +154,12 @@ def surprise(views: Sequence[Sighting], state: State, model: OutlierModel) -> fl
 
 
 def _alike(earlier: Sighting, assumed: int, view: Sighting, belief: int) -> float:
-    """How dense a view is that repeats what was false in an earlier one, relative to poses that may be anywhere."""
+    """Density of a view that repeats the error of an earlier one, relative to poses anywhere.
+
+    Args:
+        earlier, assumed: The earlier view and its belief.
+        view, belief: The later view and its belief.
+    """
     if belief >= FLIPPED:
         return float(belief == assumed)
     if not says_nothing(belief):
@@ -147,15 +170,15 @@ def _alike(earlier: Sighting, assumed: int, view: Sighting, belief: int) -> floa
 
 
 def is_false(belief: int) -> bool:
-    """Whether a view that is assumed so is wrong by more than noise."""
+    """Whether a view with this belief is off by more than noise."""
     return belief not in (INLIER, BROAD)
 
 
 def together(states: States, model: OutlierModel) -> float:
-    """What the states of all operations are likelier together than one by one, in -2 log, with the opposite sign.
+    """Correction of the surprise of all states for being judged together, instead of independently.
 
-    The rate of gross observations is not known exactly: a beta distribution about the stated one is integrated over.
-    Of operations that are displaced together there is one range among all.
+    The rate of gross observations is uncertain: it is integrated over a beta distribution about the stated rate.
+    Operations that are displaced together count as one event, one range of operations among all possible ones.
     """
     n = len(states)
     first = [state[0] for state in states if state]

@@ -1,8 +1,8 @@
-"""Where parts may be that were hardly observed: next to the others, not inside them, and well on what they lie on.
+"""Plausible places for parts that contacts leave partly free: touching what they should, and intruding into nothing.
 
-Contacts fix a part of the pose that was left out. What they leave free is chosen among a few places about the one
-that was inferred: the one where faces of contacts cover each other, then where parts are least inside each other, and
-of these the one where faces cover most.
+Contacts fix part of the pose of an operation whose observation was left out. What they leave free is chosen among a few
+places around the inferred one. The best has the fewest contacts whose faces do not overlap, then the least penetration,
+then the largest overlap.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,35 +15,37 @@ from apo_bench.correction.solvers import settle_basis
 from apo_bench.geometry import Array, Face, RoundFace, compute_overlap_area, measure_face_area, measure_intrusion, pose
 
 PLACES_TRIED = 24
+"""Number of places that are tried for all operations together."""
 LEAST_PLACES = 8
-"""Places that are tried for all operations together, and for each at least."""
+"""Least number of places that are tried for each operation."""
 _COVERED = 0.02
-"""Faces that touch cover at least this part of the smaller one."""
+"""Least overlap of faces in contact, as a fraction of the smaller face."""
 _FREE_M = 2e-3
+"""Standard deviation above which a direction counts as free, [m]."""
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
-"""A direction is free if the pose may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
+"""Scales of a twist: a radian counts as much as 50 mm."""
 _EQUAL = 1e-6
-"""Variances that differ by less than this part are equal but for rounding."""
+"""Relative difference of variances up to which they are equal."""
 _DEEP_M = 5e-4
-"""Parts that should not touch may be so deep in each other before another place is tried."""
+"""Penetration of parts that should not touch, up to which it does not count, [m]."""
 
 
 class Crowding(NamedTuple):
-    """What is wrong with poses that satisfy all equations, the worst first."""
+    """How implausible consistent poses are; smaller is better, compared field by field."""
 
     missed: int
-    """Contacts whose faces do not cover each other."""
+    """Number of contacts whose faces do not overlap."""
     depth: float
-    """The sum of the depths of parts that should not touch, [m]; 0 where none is deep."""
+    """Sum of the penetration depths of parts that should not touch, [m]."""
     bare: float
-    """How much of the smaller face contacts leave bare, all together."""
+    """Sum over the contacts of the fraction of the smaller face that is not covered."""
 
 
 def crowding(observation: Observation, poses: Array, best: Crowding | None = None) -> Crowding | None:
-    """How much parts are in each other's way, or next to each other, if the poses, (n, 4, 4), are reached exactly.
+    """Measure how implausible the poses, (n, 4, 4), are.
 
     Returns:
-        None if that is worse than `best`, as soon as that is known.
+        None as soon as the poses are found to be worse than `best`.
     """
     assembly = observation.assembly
     at = compute_placements(assembly, observation.start, poses)
@@ -70,17 +72,19 @@ def crowding(observation: Observation, poses: Array, best: Crowding | None = Non
 
 
 def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
-    """How much of the smaller of two faces that touch covers the other one, 0 to 1; of round ones, of their length."""
+    """The fraction of the smaller of two faces in contact that is covered, 0 to 1; of the length, for round faces."""
     if isinstance(a, Face) and isinstance(b, Face):
         return compute_overlap_area(a, T_a, b, T_b) / min(measure_face_area(a), measure_face_area(b))
     return measure_round(a, T_a, b, T_b).share
 
 
 def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
-    """Poses about one, (4, 4) each: spread evenly over what is free of it, the nearest first.
+    """Yield poses around one, (4, 4) each, spread evenly over its free directions, the nearest first.
 
     Args:
-        covariance: (6, 6), of the body twist by which it may be wrong, [m, rad].
+        goal: The inferred pose, (4, 4), [m].
+        covariance: (6, 6), of its body twist, [m, rad].
+        number: How many poses to yield.
     """
     from scipy.stats import norm, qmc
 
@@ -88,8 +92,8 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
     free = w > _FREE_M**2
     if not free.any():
         return
-    # Halton points, spread evenly, as normal deviates along the free axes of the covariance. Axes that are as free as
-    # each other are any of their span, so rounding would decide which: they are settled together.
+    # Halton points, spread evenly, as normal deviates along the free axes of the covariance. Within a group of equal
+    # variances rounding would decide which axes eigh returns, so each group gets a basis that its span determines.
     w = w[free]
     V = V[:, free]
     new = np.flatnonzero(np.diff(w) > _EQUAL * w[1:]) + 1
@@ -106,16 +110,16 @@ def least_crowded(
     doubted: tuple[int, ...],
     solve: Callable[[Array], Array | None],
 ) -> Array | None:
-    """Poses at which parts touch that should, and no others, as far as places that are tried allow.
+    """The most plausible of the consistent poses that are tried for the doubted operations.
 
     Args:
         poses: (n, 4, 4), consistent.
-        covariance: (n, 6, 6), of the body twists by which they may be wrong, [m, rad].
+        covariance: (n, 6, 6), of their body twists, [m, rad].
         doubted: The operations whose observation was left out.
-        solve: Poses as they are inferred, (n, 4, 4) -> consistent poses, or None where there are none.
+        solve: Takes poses with some of them moved, (n, 4, 4), to consistent poses; None if there are none.
 
     Returns:
-        None if the given poses are as good as any that were tried, or nothing is wrong with them.
+        None if nothing is wrong with the given poses, or none that were tried are better.
     """
     best = crowding(observation, poses)
     assert best is not None

@@ -1,8 +1,8 @@
-"""Which observations are outliers is part of the estimate: hypotheses of that, and how likely the views make them.
+"""Hypotheses of which observations are outliers, each solved for its poses and scored by its likelihood.
 
-Given the states of all views, what contacts leave at the observation is Gaussian, with covariance J C J^t and what
-play and curvature add, so hypotheses are compared by the likelihood of that; what no contact tells does not count. A
-relation may be wrong in place of an observation: its faces are then anywhere.
+Given the states of all views, the residual of the contacts at the observation is Gaussian. Its covariance is J C J^t
+plus what play and curvature add. Hypotheses are compared by the likelihood of that residual; what no contact depends on
+does not count. Instead of an observation a relation may be wrong: its faces may then be anywhere.
 """
 
 from __future__ import annotations
@@ -43,28 +43,30 @@ from apo_bench.correction.solvers import compute_jacobian_rank, factor_noise, li
 from apo_bench.geometry import Array, compute_right_jacobian, copy_frozen, pose
 
 as_begun = ContactCorrector("apply", elsewhere=False)
+"""The corrector `contact` that ignores a failed test and tries no other starts."""
 _FAR_RAD = np.radians(10.0)
-"""Parts that are assumed to be turned by less (a standard deviation) are not far from the observed ones: no other start
-is tried, and what is far nevertheless is an outlier."""
+"""Standard deviation of a rotation below which no other start is tried: a larger error is an outlier."""
 UNKNOWN = copy_frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
-"""(6, 6): how far the pose of an operation that was left out may be from what its contacts say of it, [m, rad]."""
+"""Covariance of the pose of a left-out operation about the inferred one, (6, 6), [m, rad]."""
 _WRONG_M = 0.05
-"""Faces that a wrong relation names may be so far apart."""
+"""Standard deviation of the distance of faces that a wrong relation names, [m]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What there is to explain."""
+    """The input of a search: an observation, all views of its operations, and the outlier model."""
 
     observation: Observation
-    """The first look: assembly, start poses and play are those of all."""
+    """The first observation: its assembly, start poses and play hold for all views."""
     views: Sightings
     model: OutlierModel
     _merged: dict[tuple[int, State, int | None], Merged] = field(default_factory=dict, init=False, repr=False)
 
     def merge_views(self, k: int, state: State, exchanged: int | None = None) -> Merged:
-        """`views.merge_views` of operation k, once each; `exchanged` is the operation whose view belongs to it."""
+        """`views.merge_views` of operation k, cached; `exchanged` is the operation whose view is swapped with its
+        own.
+        """
         key = k, state, exchanged
         if key not in self._merged:
             other = None if exchanged is None else self.views[exchanged][0]
@@ -75,21 +77,24 @@ class Case:
 @final
 @dataclass(frozen=True, eq=False)
 class SolvedHypothesis:
-    """What is assumed, and what comes of that."""
+    """A hypothesis, with the correction that follows from it."""
 
     case: Case
     states: States
     dropped: tuple[str, ...]
     """Relations that are rejected."""
     observation: Observation
-    """Views merged, and operations of which none is assumed where contacts say, with `UNKNOWN`."""
+    """The assumed observation: views merged; operations without a trusted view inferred from contacts, covariance
+    `UNKNOWN`."""
     correction: Correction
     scale: float = 1.0
-    """How much larger than stated the noise of all views is."""
+    """Assumed ratio of the actual noise of all views to the stated noise."""
 
     @property
     def key(self) -> tuple[States, tuple[str, ...], bool]:
-        """What it assumes."""
+        """What the hypothesis assumes, as a key: states, dropped relations, and whether the noise is larger than
+        stated.
+        """
         return self.states, self.dropped, self.scale > 1.0
 
     @property
@@ -99,7 +104,9 @@ class SolvedHypothesis:
 
     @property
     def doubts(self) -> bool:
-        """Whether anything is not taken as stated."""
+        """Whether the hypothesis differs from what was stated: an outlier, a missing operation, a wrong relation,
+        larger noise.
+        """
         return (
             bool(self.dropped)
             or self.scale > 1.0
@@ -109,13 +116,13 @@ class SolvedHypothesis:
 
     @cached_property
     def badness(self) -> float:
-        """-2 log of how likely states and views are together, but for a constant; infinite if there is no solution."""
+        """-2 log of the joint probability of states and views, up to a constant; infinite if there is no solution."""
         correction = self.correction
         observation = self.observation
         if not correction.ok or correction.test is None or not self._faces_oppose():
             return np.inf
         # What contacts leave at the observation is Gaussian with covariance S = J J^t + soft^2: -2 log of its density
-        # is the squared length of the correction and log det S. Of an operation that was left out `ROOM` is as likely.
+        # is the squared length of the correction plus log det S. A left-out operation may be anywhere (`ROOM`).
         wide = observation.covariance * self.scale**2
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
@@ -132,7 +139,7 @@ class SolvedHypothesis:
         return float(unlikely + surprise)
 
     def scale_noise(self) -> SolvedHypothesis:
-        """The same if all noise is larger than stated, by as much as is likeliest: the poses stay."""
+        """The hypothesis with the most likely noise scale, if that is above `LEAST`; poses stay the same."""
         test = self.correction.test
         if test is None or self.scale > 1.0 or self.observation.shared:
             return self
@@ -141,37 +148,41 @@ class SolvedHypothesis:
 
     @property
     def stated(self) -> Observation:
-        """What is assumed with the noise that is."""
+        """The assumed observation with the estimated noise."""
         return scale_noise(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
 
     @property
     def covariance(self) -> Array | None:
-        """Of the poses, (n, 6, 6), [m, rad], with the noise that is."""
+        """Posterior covariance of the poses with the estimated noise, (n, 6, 6), [m, rad]; None if unknown."""
         C = self.correction.covariance
         return C if C is None or self.scale == 1.0 else C * self._region_scale**2
 
     @property
     def _region_scale(self) -> float:
+        """Noise scale for regions, which includes the uncertainty of the scale itself."""
         return region_scale(self.scale, self.correction.test.freedom) if self.correction.test else self.scale
 
     def at(self, poses: Array, unknown: Sequence[int]) -> SolvedHypothesis:
-        """The same with the inferred poses of some operations elsewhere, at these of poses (n, 4, 4)."""
+        """The hypothesis solved again from other inferred poses of the `unknown` operations, taken from `poses`, (n, 4,
+        4).
+        """
         moved = self._move(poses, unknown)
         correction = retest(moved, _correct(moved, self.dropped), self.left_out)
         return replace(self, observation=moved, correction=correction)
 
     def poses_at(self, poses: Array, unknown: Sequence[int]) -> Array | None:
-        """Its poses, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
+        """The poses of `at` alone, (n, 4, 4); None if there is no solution or faces in contact do not oppose."""
         correction = _correct(self._move(poses, unknown), self.dropped)
         return correction.poses if correction.ok and self.stands_at(correction.poses) else None
 
     def _move(self, poses: Array, unknown: Sequence[int]) -> Observation:
+        """The assumed observation with the poses of the `unknown` operations taken from `poses`, (n, 4, 4)."""
         there = np.array(self.observation.poses)
         there[list(unknown)] = poses[list(unknown)]
         return replace(self.observation, poses=there)
 
     def stands_at(self, poses: Array) -> bool:
-        """Whether the faces of every contact that is assumed look at each other at the poses, (n, 4, 4)."""
+        """Whether the faces of every contact that is not dropped oppose at the poses, (n, 4, 4)."""
         observation = self.observation
         away = find_faces_away(observation.assembly, observation.start, poses)
         return not (away & observation.assembly.without(self.dropped)).any()
@@ -181,31 +192,31 @@ class SolvedHypothesis:
 
     @property
     def p_value(self) -> float:
-        """Of the test of its correction; 0 if there is no solution."""
+        """The p-value of `test`; 0 if there is no solution."""
         return self.test.p_value if self.test and np.isfinite(self.badness) else 0.0
 
     @property
     def test(self) -> Consistency | None:
-        """Of its correction; with the noise that is, where that which is stated does not explain it."""
+        """The test of the correction; with the estimated noise if the stated noise does not explain it."""
         test = self.correction.test
         return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
 def untrusted_operations(states: States) -> tuple[int, ...]:
-    """Operations whose views are all rejected."""
+    """Operations whose views are all stale or gross, or that have none."""
     return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
 def prior_surprise(case: Case, states: States, dropped: tuple[str, ...]) -> float:
-    """-2 log of how likely states are, and the views in them, without contacts; relative to all as stated."""
+    """-2 log of the probability of states, views and dropped relations, without contacts, relative to all as stated."""
     each = sum(case.merge_views(k, state).surprise for k, state in enumerate(states))
     return each + together(states, case.model) + len(dropped) * case.model.relation_surprise
 
 
 def soften(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[np.bool_], Array]:
-    """Which equations are those of wrong relations, (3 c,), and how far each may be from nominal, (3 c,), [m].
+    """Which equations belong to wrong relations, (3 c,), and the standard deviation of each equation, (3 c,), [m].
 
-    Faces of a wrong relation are anywhere: its equations deviate by their distance, not by what play leaves.
+    Equations of a wrong relation deviate by `_WRONG_M`, all others by play and by what counts as a contradiction.
     """
     soft = soft_deviation(observation)
     if not dropped:
@@ -218,10 +229,10 @@ def soften(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[
 def hypothesis(
     case: Case, states: States, dropped: tuple[str, ...] = (), assumed: Observation | None = None
 ) -> SolvedHypothesis:
-    """Solve for the poses that are most likely with these states, and without these relations.
+    """Solve for the most likely poses under assumed states and dropped relations.
 
     Args:
-        assumed: The `assumed_observation` of the states, if it is at hand.
+        assumed: The `assumed_observation` of the states, if it is known already.
     """
     if assumed is None:
         assumed = assumed_observation(case, states)
@@ -231,10 +242,10 @@ def hypothesis(
 
 
 def retest(assumed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
-    """With the test of what was observed alone: directions that only left-out operations could show are not tested.
+    """The correction with its test restricted to what was observed.
 
-    What is inferred agrees with its contacts, so these operations add nothing to the squared length, and the rank of
-    their own columns is no degree of freedom.
+    Directions that only left-out operations could violate are no degrees of freedom: their inferred poses agree with
+    their contacts and add nothing to the squared length.
     """
     if not left_out or correction.test is None or not correction.ok:
         return correction
@@ -256,13 +267,16 @@ def retest(assumed: Observation, correction: Correction, left_out: tuple[int, ..
 
 
 def as_stated(observation: Observation) -> Correction:
-    """The correction if every observation is assumed as it is stated."""
+    """The correction that trusts every observation; other starts are tried only if a rotation is very uncertain."""
     far = (observation.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any()
     return contact_apply(observation) if far else as_begun(observation)
 
 
 def assumed_observation(case: Case, states: States) -> Observation:
-    """Views merged, and what is rejected inferred; shared errors and tails of several views are not kept."""
+    """The observation that the states imply: views merged, rejected operations inferred from contacts.
+
+    With several views of an operation, shared errors and tails are not kept.
+    """
     first = case.observation
     poses = np.array(first.poses)
     covariance = np.array(first.covariance)
@@ -285,7 +299,7 @@ def assumed_observation(case: Case, states: States) -> Observation:
 
 
 def _displace(observation: Observation, operations: tuple[int, ...]) -> Observation:
-    """With one displacement that some operations share, about their middle."""
+    """Add a displacement that some operations share, about their mean position, as a shared error."""
     P = np.eye(4)
     P[:3, 3] = observation.poses[list(operations), :3, 3].mean(axis=0)
     error = SharedError("view", operations, VIEW, P)
@@ -295,10 +309,10 @@ def _displace(observation: Observation, operations: tuple[int, ...]) -> Observat
 
 
 def soft_deviation(observation: Observation) -> Array:
-    """How far each equation may be from nominal, (3 c,), [m]."""
+    """The standard deviation of each equation, (3 c,), [m], from play and from what counts as a contradiction."""
     return np.hypot(fit_deviation(observation.assembly, observation.play_m), CONTRADICTION_M)
 
 
 def _correct(observation: Observation, dropped: tuple[str, ...]) -> Correction:
-    """Without other starts: what is rejected is where contacts say already."""
+    """Correct without other starts, since rejected operations begin where their contacts put them."""
     return as_begun.leaving_out(observation, dropped) if dropped else as_begun(observation)

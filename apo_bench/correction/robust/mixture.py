@@ -1,8 +1,8 @@
-"""The covariance of a mixture of hypotheses about the poses of the likeliest.
+"""Covariance of the poses of the most likely hypothesis, with the hypotheses that lead to nearly the same poses.
 
-Poses are those of the likeliest: a mean of poses that satisfy contacts satisfies none, and a mean of a part and the
-same part turned round is nowhere. Hypotheses that lead to nearly the same poses are one mode of the mixture, and the
-covariance is that of the mode. Those that lead elsewhere keep poses and covariance of their own.
+The reported poses are those of the most likely hypothesis, since a mean of consistent poses is not consistent.
+Hypotheses with nearly the same poses form one mode of the mixture, and the covariance is that of the mode. Others keep
+their own poses and covariance.
 """
 
 from collections.abc import Sequence
@@ -13,17 +13,16 @@ from apo_bench.assembly import Hypothesis
 from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 _APART = 22.5
-"""Squared difference of two poses, in standard deviations of both, beyond which hypotheses are different modes: with
-six degrees of freedom one in a thousand is larger."""
+"""Squared distance of two poses, in standard deviations of both, beyond which they are different modes; one in a
+thousand is larger, with six degrees of freedom."""
 _FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
-"""(6, 6): poses are not distinguished by less, [m, rad]."""
+"""Covariance added to differences of poses, (6, 6), [m, rad], so that tiny differences do not separate modes."""
 
 
 def mode_covariance(hypotheses: Sequence[Hypothesis]) -> Array | None:
-    """The covariance of the first hypothesis and of those of its mode about its poses, (n, 6, 6), [m, rad].
+    """The covariance of the first hypothesis and those of its mode, about the poses of the first, (n, 6, 6), [m, rad].
 
-    The second moment of a mixture: of each hypothesis its covariance and the square of how far its poses are off, by
-    their weights.
+    It is the weighted second moment: the covariance of each hypothesis plus the square of its offset from the first.
 
     Returns:
         None if the first has no covariance.

@@ -1,4 +1,4 @@
-"""Hypotheses that differ from one by what is assumed of an operation, of two that are exchanged, of some in a row."""
+"""Neighbours of a hypothesis in the search: one view with another belief, two views swapped, or a row displaced."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -28,26 +28,30 @@ from apo_bench.correction.robust.views import Sightings, exchanged_view, merge_v
 from apo_bench.geometry import Array, pose
 
 _MOST_READINGS = 3
-"""Readings of one view that are solved."""
+"""Most beliefs of one view that are solved."""
 _UNLIKELY = 30.0
-"""A reading that is less likely than the likeliest by so much in -2 log is not solved."""
+"""Difference in -2 log from the most likely belief beyond which a belief is not solved."""
 _FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
-"""(6, 6): poses that contacts fix are known to no less than this, [m, rad]."""
+"""Covariance added to that of inferred poses, (6, 6), [m, rad], since contacts fix some directions exactly."""
 _WIDER = 2
-"""Operations by which a row of displaced ones is made longer at either end."""
+"""Number of operations by which a displaced row is extended at either end."""
 
 
 def change_states(states: States, which: Sequence[int], to: Sequence[State]) -> States:
-    """With the states of some operations replaced."""
+    """The states with those of operations `which` replaced by `to`."""
     new = dict(zip(which, to, strict=True))
     return tuple(new.get(k, state) for k, state in enumerate(states))
 
 
 def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting) -> list[int]:
-    """What may be assumed of a view of operation k, the likeliest first, given the poses that are inferred without it.
+    """The most likely beliefs of a view, the best first, given the poses that are inferred without it.
 
-    Near these poses everything is Gaussian: a reading is as likely as it is near to the inferred pose, in standard
-    deviations of both. Of what contacts leave free the inferred pose knows nothing.
+    Near these poses everything is Gaussian: a belief is scored by the distance of its pose from the inferred one, in
+    standard deviations of both.
+
+    Args:
+        without: The solved hypothesis in which this view is rejected.
+        k: The operation of the view.
     """
     rest = [belief for belief in alternatives(view) if belief not in (BROAD, GROSS)]
     C = without.correction.covariance
@@ -69,14 +73,17 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
 
 
 def _widen(C: Array) -> Array:
-    """The covariance of an inferred pose if nothing but contacts tells of it: `UNKNOWN` is anywhere in the room."""
+    """The covariance of an inferred pose, (6, 6), if only contacts constrain it: prior `ROOM` in place of `UNKNOWN`."""
     W = np.linalg.inv(C) - np.linalg.inv(UNKNOWN) + np.linalg.inv(ROOM)
     w, V = np.linalg.eigh((W + W.T) / 2)
     return np.asarray((V / np.maximum(w, 1.0)) @ V.T)
 
 
 def swaps(case: Case, states: States) -> Iterator[States]:
-    """With the views of two operations exchanged, of which one at least is in doubt; both if their parts differ."""
+    """Yield states in which the views of two operations are swapped.
+
+    At least one of the two is in doubt; both are, if their parts differ.
+    """
     doubted = {k for k, state in enumerate(states) if any(map(is_false, state))}
     solids = [case.observation.assembly.solids[one.main] for one in case.observation.assembly.operations]
     for k in sorted(doubted):
@@ -88,7 +95,9 @@ def swaps(case: Case, states: States) -> Iterator[States]:
 
 
 def continue_states(views: Sightings, states: States, model: OutlierModel) -> States:
-    """States of the earlier views, with the likeliest of the later ones: right, anywhere, or false again."""
+    """Extend the states of earlier views by the most likely belief of each new view: inlier, gross, or the first one
+    again.
+    """
     grown = list[State]()
     for own, state in zip(views, states, strict=True):
         now = state
@@ -101,7 +110,7 @@ def continue_states(views: Sightings, states: States, model: OutlierModel) -> St
 
 
 def displace_together(states: States) -> Iterator[States]:
-    """With operations in a row displaced together: those in doubt, and some of their neighbours."""
+    """Yield states in which a row of consecutive operations is displaced: those in doubt, and some neighbours."""
     alone = [len(state) == 1 for state in states]
     doubted = [k for k, state in enumerate(states) if alone[k] and is_false(state[0])]
     if not doubted:
@@ -112,14 +121,17 @@ def displace_together(states: States) -> Iterator[States]:
             row = range(first, last + 1)
             if all(alone[k] for k in row):
                 yield tuple((DISPLACED,) if k in row else state for k, state in enumerate(states))
-    # One operation less at either end of a row.
+    # Also shorten an existing row by one operation at either end.
     displaced = [k for k in doubted if states[k] == (DISPLACED,)]
     if len(displaced) > 2:
         yield from (change_states(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
 
 
 def false_together(case: Case, start: States) -> Iterator[States]:
-    """All operations seen anywhere, any two exchanged, any row displaced: where no set without the rest agrees."""
+    """Yield states for the case that no set of operations agrees without the rest.
+
+    All observed operations gross; any two swapped; any row of consecutive ones displaced.
+    """
     seen = [k for k, state in enumerate(start) if state]
     yield change_states(start, seen, [(GROSS,) * len(start[k]) for k in seen])
     for k in seen:

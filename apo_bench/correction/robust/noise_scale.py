@@ -1,8 +1,7 @@
-"""Noise that is larger than stated: by how much is part of the estimate, as far as contacts are redundant.
+"""Estimate of the ratio s of the actual noise to the stated noise, from the length of the correction.
 
-If all errors are s times as large, a correction is s times as long, and its poses are the same. So the squared length
-and its degrees of freedom tell s, and nothing is solved again. What is not known of s before is that its logarithm is
-normal.
+If all errors are s times as large, the correction is s times as long and the poses are the same. So the squared length
+and its degrees of freedom determine s without another solution. The prior of log s is normal.
 """
 
 from dataclasses import replace
@@ -13,15 +12,17 @@ from apo_bench.assembly import Consistency, Observation
 from apo_bench.correction.checks.chi_square import p_value
 
 SPREAD = 1.0
-"""Standard deviation of the logarithm of s: twice as noisy is nothing special."""
+"""Prior standard deviation of log s: noise twice as large as stated is nothing unusual."""
 SCALED = 0.1
-"""How often noise is of another size than stated."""
+"""Prior probability that the noise differs from what is stated."""
 LEAST = 1.15
-"""Noise that is less than so many times as large is taken as it is stated."""
+"""Scales below this count as 1."""
 _SAID = 1.5
-"""What is less than so many times as large happens by chance, and nothing is stated of it."""
+"""Scales below this are not mentioned in the sentence, since they happen by chance."""
 _LARGEST = 10.0
+"""Largest scale that is considered."""
 _STEPS = 30
+"""Most Newton steps."""
 
 
 def likeliest_scale(chi_square: float, freedom: int) -> float:
@@ -40,26 +41,26 @@ def likeliest_scale(chi_square: float, freedom: int) -> float:
 
 
 def scale_surprise(scale: float, freedom: int) -> float:
-    """-2 log of how likely it is beforehand that noise is so much larger, within what the correction tells of that."""
+    """-2 log of the prior probability of a noise scale, within the precision to which the correction determines it."""
     width = 1.0 / np.sqrt(2.0 * freedom + 1.0 / SPREAD**2)
     prior = (np.log(scale) / SPREAD) ** 2 - 2.0 * np.log(width / SPREAD)
     return float(prior - 2.0 * np.log(SCALED / (1.0 - SCALED)))
 
 
 def region_scale(scale: float, freedom: int) -> float:
-    """How much larger than stated regions are made: that the scale is estimated makes them those of Student's t."""
+    """Factor for the size of regions: the scale, enlarged since it is estimated, as in Student's t."""
     return scale * float(np.sqrt(1.0 + 2.0 / freedom)) if scale > 1.0 else 1.0
 
 
 def scaled_test(test: Consistency, scale: float) -> Consistency:
-    """The test with noise that is so much larger; to estimate the scale costs a degree of freedom."""
+    """The test with noise `scale` times as large; estimating the scale costs one degree of freedom."""
     chi_square = test.chi_square / scale**2
     freedom = max(test.freedom - 1, 0)
     return replace(test, chi_square=chi_square, freedom=freedom, p_value=p_value(chi_square, freedom))
 
 
 def scale_noise(observation: Observation, scale: float) -> Observation:
-    """An observation that states so many times its noise."""
+    """The observation with all its stated noise multiplied by `scale`."""
     shared = tuple(replace(error, covariance=error.covariance * scale**2) for error in observation.shared)
     tails = observation.tails
     if tails is not None:

@@ -1,4 +1,4 @@
-"""The corrector `contact-robust`: finds observations that are grossly wrong or missing by their contacts."""
+"""The corrector `contact-robust`: rejects observations that contradict the others through their contacts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,28 +29,28 @@ from apo_bench.correction.robust.views import add_views, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
-"""At which weights hold, of scenes that are in no benchmark."""
+"""Temperature at which the weights of hypotheses are calibrated, tuned on scenes of no benchmark."""
 UNNAMED = 0.02
-"""How often none of the hypotheses is right there: what the weights of all leave to 1."""
+"""Rate at which none of the hypotheses was right on those scenes; all weights together leave this to 1."""
 _LITTLE = 0.005
-"""A relation that is to blame with less is not mentioned."""
+"""Probability below which a wrong relation is not mentioned."""
 _SURE = 0.01
-"""An operation is looked at again if it is likelier than this that another state is the right one, ..."""
+"""Probability of another state above which an operation is observed again."""
 _SURE_DEVIATION = np.repeat([5e-3, np.radians(5.0)], 3)
-"""... or where its pose is less certain than this, [m, rad]."""
+"""Standard deviation of a pose above which its operation is observed again, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True)
 class RobustCorrector:
-    """Nearest consistent poses, with observations left out that the others contradict."""
+    """The corrector `contact-robust`: nearest consistent poses without observations that contradict the others."""
 
     outliers: OutlierModel | None = None
-    """None stands for what the observation states, or for what is usual."""
+    """Rates of outliers; None: those of the observation, or else the defaults of `OutlierModel`."""
     level: float = TEST_LEVEL
-    """A set of observations is assumed if the p-value of its correction is not below."""
+    """A set of observations is accepted if the p-value of its correction is at least this."""
     temperature: float = TEMPERATURE
-    """Weights of hypotheses are likelihoods to the power of its inverse."""
+    """Weights of hypotheses are likelihoods to the power of 1 / temperature."""
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
@@ -65,7 +65,9 @@ class RobustCorrector:
         return self.correct_and_reobserve(observation, None)
 
     def together(self, observations: Sequence[Observation]) -> list[Correction]:
-        """Correct observations of one assembly with the same start poses and play: at once those that pass the test."""
+        """Correct observations of one assembly with the same start poses and play; those that pass the test, in one
+        batch.
+        """
         observations = project_observations(observations)
         plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
         made: list[Correction | None] = [None] * len(observations)
@@ -74,7 +76,7 @@ class RobustCorrector:
         return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
 
     def correct_and_reobserve(self, observation: Observation, reobserve: Reobserver | None) -> Correction:
-        """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
+        """Correct an observation, observing doubtful operations again while there are any and observations are left."""
         if reobserve is None and self._is_plain(observation):
             correction = self._accept(observation, as_stated(observation))
             if correction is not None:
@@ -102,12 +104,16 @@ class RobustCorrector:
         return self.outliers or observation.outliers or OutlierModel()
 
     def _is_plain(self, observation: Observation) -> bool:
-        """One view of each operation, an inlier more likely than not: nothing is searched while the test holds."""
+        """Whether no search is needed if the test passes: all operations observed, and inliers likelier than gross
+        errors.
+        """
         model = self._model(observation)
         return bool(observation.observed.all()) and model.surprises[INLIER] < model.surprises[GROSS]
 
     def _accept(self, observation: Observation, correction: Correction) -> Correction | None:
-        """A correction of all as it is stated, if that holds; noise that is larger makes regions larger."""
+        """The correction that trusts all observations, if its test passes, with the estimated noise scale; otherwise
+        None.
+        """
         test = correction.test
         if not correction.ok or test is None or test.p_value < self.level:
             return None
@@ -125,10 +131,11 @@ class RobustCorrector:
 
 
 contact_robust = RobustCorrector()
+"""The corrector `contact-robust` with its default settings."""
 
 
 def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
-    """Operations that are worth another look: of which nothing is assumed as it was stated, or not surely."""
+    """Operations to observe again: no view is an inlier, the pose is uncertain, or another state is likely."""
     if best is None:
         return tuple(range(search.operations))
     doubted = []
@@ -141,7 +148,7 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
 
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
-    """A hypothesis whose operations of which little was observed lead to where there is room for their parts."""
+    """The hypothesis with inferred and shifted operations moved to where their parts have room (`crowding`)."""
     shifted = tuple(k for k, state in enumerate(hypothesis.states) if state == (SHIFTED,))
     unknown = tuple(sorted({*hypothesis.left_out, *shifted}))
     covariance = hypothesis.correction.covariance
@@ -158,7 +165,13 @@ def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
 def _report(
     observation: Observation, first: SolvedHypothesis, search: Search, best: SolvedHypothesis, again: list[int]
 ) -> Correction:
-    """The correction of what is assumed, with what was observed at first."""
+    """The correction of the best hypothesis, with gaps and test of the first observation.
+
+    Args:
+        first: The hypothesis that trusts each operation by itself, whose test is reported.
+        best: The most likely hypothesis.
+        again: Operations that were observed again.
+    """
     correction = best.correction
     if not best.doubts and not again:
         return replace(correction, sentence=correction.sentence + _describe_misfit(best))
@@ -179,7 +192,7 @@ def _report(
 
 
 def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...]:
-    """All that were kept; the likeliest with its parts where there is room for them, as the poses that are returned."""
+    """All hypotheses that are kept, with weights, the best first; it has the poses that are returned."""
     weights = dict[tuple[States, tuple[str, ...]], float]()
     solved_by = {(best.states, best.dropped): best}
     for weight, solved in search.weighted():
@@ -206,7 +219,7 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
 
 
 def _describe_misfit(best: SolvedHypothesis) -> str:
-    """What the test says that no outlier explains better."""
+    """State in words that the test of the best hypothesis fails; empty if it passes."""
     if best.test is None or best.test.passes:
         return ""
     p = best.test.p_value
@@ -214,7 +227,7 @@ def _describe_misfit(best: SolvedHypothesis) -> str:
 
 
 def _doubts(search: Search, best: SolvedHypothesis) -> str:
-    """What is rejected, and how likely it is that a relation is wrong in place of an observation."""
+    """State in words what is rejected, and how likely a wrong relation is compared with a wrong observation."""
     words = _list_doubts(best)
     rival = search.rival(best)
     if rival is None:
@@ -245,19 +258,20 @@ def _list_doubts(best: SolvedHypothesis) -> str:
 
 
 def _those(best: SolvedHypothesis, which: Callable[[int], bool]) -> tuple[int, ...]:
-    """Operations with a view that is assumed so, and that are not left out."""
+    """Operations that are not left out and have a view whose belief satisfies `which`."""
     return tuple(k for k, state in enumerate(best.states) if any(map(which, state)) and k not in best.left_out)
 
 
 def _looks(again: list[int]) -> str:
-    """What was looked at again."""
+    """State in words which operations were observed again."""
     return f"; looked again at {_operations(sorted({*again}))}" if again else ""
 
 
 def _operations(some: Sequence[int]) -> str:
+    """Operations in words, counted from 1: `operation 2, 3`."""
     return f"operation {', '.join(str(k + 1) for k in some)}"
 
 
 def _share(x: float) -> str:
-    """`0.93`, or `< 0.01`."""
+    """A probability in words: `0.93`, `< 0.01` or `> 0.99`."""
     return "< 0.01" if x < _LITTLE else f"{min(x, 0.99):.2f}" if x < 1.0 - _LITTLE else "> 0.99"

@@ -1,9 +1,9 @@
-"""The likeliest hypothesis: which views are outliers, or which relation is wrong.
+"""Search for the most likely hypothesis: which views are outliers, or which relation is wrong.
 
-While the test of `contact` holds, nothing is doubted. If it fails, the smallest sets of operations are looked for
-without which the rest agrees: a set is solved only if the contacts that none of it has a part in agree with each other
-at what was observed, which is quick to check for every set. Of the sets whose test holds the likeliest is taken. Then
-each of its states is changed while that is likelier, and each relation that it has a part in may be wrong instead.
+If the test of `contact` passes, nothing is doubted. If it fails, the search looks for the smallest sets of operations
+without which the rest agrees. A set is solved only if the contacts that depend on none of it agree with each other,
+which is quick to check. Among sets whose test passes the most likely is taken. Then single states are changed while
+that improves it, and relations are dropped in place of operations.
 """
 
 from __future__ import annotations
@@ -36,35 +36,39 @@ from apo_bench.correction.robust.views import beliefs
 from apo_bench.geometry import Array
 
 MOST_EXACT = 12
-"""Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
+"""Number of operations up to which every set is checked; beyond, sets grow by one operation at a time."""
 _LENIENT = 1e-4
-"""A set is not solved if what is left of the contacts agrees worse than by this p-value."""
+"""A set is not solved if the contacts that remain agree with a p-value below this."""
 _MOST_SOLVED = 24
-"""Hypotheses of one size that are solved, those whose rest agrees best."""
+"""Most hypotheses of one set size that are solved, those that agree best."""
 _BY = 15.0
-"""An operation that is less likely to be wrong, by so much in -2 log, counts like one more of a set."""
+"""Difference in -2 log by which a less likely outlier counts like one more operation in a set."""
 _MOST_STARTS = 32
+"""Most combinations of equally likely states that are compared as a start."""
 _EQUALLY = 2.0
-"""States of an operation that differ by less, in -2 log, are as likely as each other by themselves."""
+"""Difference in -2 log up to which two states of an operation are equally likely."""
 _MOST_OTHER = 3
-"""States of one operation that are tried in a set."""
+"""Most alternative states of one operation in a set."""
 _MOST_ALTOGETHER = 100
-"""Hypotheses beyond which no larger sets are tried, and so many more beyond which nothing is refined."""
+"""Most hypotheses before the search stops growing sets; the refinement may look at as many more."""
 _HOPELESS = 150.0
-"""What is so much less likely than the likeliest, in -2 log, by contacts that are linearised once, is not solved. Of
-742 hypotheses, of outliers in ten scenes, that were within 60 when they were solved the farthest was at 118 by that."""
+"""Difference in estimated -2 log from the best beyond which a hypothesis is not solved. Of 742 hypotheses, of outliers
+in ten scenes, that were within 60 when solved, the largest estimate was 118."""
 _MOST_KEPT = 16
+"""Most hypotheses that are reported."""
 _LEAST_KEPT = 1e-3
-"""Hypotheses that are reported at most, and how likely one is at least relative to the likeliest."""
+"""Least weight of a reported hypothesis, relative to the best."""
 
 
 @final
 class Search:
-    """The hypotheses of one case, each solved once."""
+    """The hypotheses of one case, each solved at most once."""
 
     def __init__(self, case: Case, level: float, temperature: float = 1.0) -> None:
-        """Args:
-        level: As of `RobustCorrector`, and so is `temperature`.
+        """Begin a search without solved hypotheses.
+
+        Args:
+            level: As of `RobustCorrector`, and so is `temperature`.
         """
         self._temperature = temperature
         self._case = case
@@ -74,10 +78,14 @@ class Search:
         self._expected: dict[tuple[States, tuple[str, ...], bool], float] = {}
         self.operations = len(case.views)
         self.first: SolvedHypothesis | None = None
-        """What is likeliest of each operation by itself."""
+        """The hypothesis with the most likely state of each operation by itself."""
 
     def likeliest(self, known: SolvedHypothesis | None = None) -> SolvedHypothesis | None:
-        """None if nothing that was tried has a solution; `known` is what was likeliest before the last look."""
+        """The most likely hypothesis that was found; None if none has a solution.
+
+        Args:
+            known: The most likely hypothesis before the last reobservation.
+        """
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
@@ -100,28 +108,28 @@ class Search:
         return min(self._known(), key=_badness, default=None)
 
     def _rescale(self) -> None:
-        """What if noise is larger than stated: all that was observed assumed, or what is likeliest."""
+        """Add hypotheses with larger noise: of the start, and of the most likely one."""
         for one in (self.first, min(self._known(), key=_badness, default=None)):
             if one is not None and (scale_noise := one.scale_noise()).scale > one.scale:
                 self._solved[scale_noise.key] = scale_noise
 
     def share(self, best: SolvedHypothesis, k: int) -> float:
-        """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
+        """Probability, over all solved hypotheses, that operation k is in another state than in `best`."""
         return self.weight(best, lambda other: other.states[k] != best.states[k])
 
     def rival(self, best: SolvedHypothesis) -> SolvedHypothesis | None:
-        """The likeliest explanation of the other kind: with a wrong relation, or without one."""
+        """The most likely hypothesis of the other kind: with a dropped relation if `best` has none, or without one."""
         others = [other for other in self._known() if bool(other.dropped) != bool(best.dropped)]
         return min(others, key=_badness, default=None)
 
     def weight(self, best: SolvedHypothesis, which: Callable[[SolvedHypothesis], bool]) -> float:
-        """How likely some of the hypotheses are together."""
+        """Total probability of the hypotheses that satisfy `which`."""
         known = self._known()
         weights = self._weights(known, best)
         return float(weights @ [which(other) for other in known] / weights.sum())
 
     def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
-        """What was solved with its weight, the likeliest first; the unlikely ones left out."""
+        """The most likely hypotheses with their weights, which add up to 1, the best first."""
         known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
         if not known:
             return []
@@ -131,26 +139,33 @@ class Search:
         return [(float(weight / whole), solved) for weight, solved in kept]
 
     def _weights(self, some: list[SolvedHypothesis], best: SolvedHypothesis) -> Array:
-        """How likely some are relative to the best: their likelihood by the temperature."""
+        """Likelihood of each hypothesis relative to the best, at the temperature."""
         return np.exp([-0.5 / self._temperature * (one.badness - best.badness) for one in some])
 
     def _known(self) -> list[SolvedHypothesis]:
+        """The solved hypotheses that have a solution."""
         return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
     def _try(
         self, states: States, dropped: tuple[str, ...] = (), assumed: Observation | None = None
     ) -> SolvedHypothesis:
+        """The solved hypothesis with these states and dropped relations, from the cache or new."""
         key = states, dropped, False
         if key not in self._solved:
             self._solved[key] = hypothesis(self._case, states, dropped, assumed)
         return self._solved[key]
 
     def _looked_at(self) -> int:
-        """How many hypotheses were solved, or found to be hopeless."""
+        """Number of hypotheses that were solved or rejected by their estimate."""
         return len(self._solved.keys() | self._expected.keys())
 
     def _solve(self, some: Iterable[tuple[States, tuple[str, ...]]], least: float = np.inf) -> list[SolvedHypothesis]:
-        """Those of some hypotheses, solved, that are not hopeless compared with this -2 log."""
+        """Solve hypotheses in the order of their estimates, except those that are hopeless; return the solved ones.
+
+        Args:
+            some: States and dropped relations of each.
+            least: The -2 log of the best so far, with which estimates are compared.
+        """
         some = list(some)
         assumed = dict[States, Observation]()
         for states, dropped in some:
@@ -168,7 +183,7 @@ class Search:
         ]
 
     def _start(self) -> States:
-        """The likeliest state of each operation by itself; of those that are equally likely what contacts like best."""
+        """The most likely state of each operation by itself; ties are broken by the agreement of the contacts."""
         likeliest = [[state for s, state in own if s <= own[0][0] + _EQUALLY] for own in self._beliefs]
         several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
         if len(several) == 1:
@@ -176,7 +191,10 @@ class Search:
         return min(several, key=lambda states: ContactAgreement(self._case, states).disagreement())
 
     def _smallest(self, start: States) -> SolvedHypothesis | None:
-        """The likeliest of the smallest sets, or single relations, whose test holds; else of all that were solved."""
+        """The most likely hypothesis of the smallest size, sets of operations or single relations, whose test passes.
+
+        If none passes, the most likely of all that were solved.
+        """
         tried = self._solve((start, (relation,)) for relation in self._relations(start))
         gross = self._case.model.surprises[GROSS]
         for size, sets in enumerate(self._sets(start), start=1):
@@ -193,7 +211,7 @@ class Search:
         return min(self._known(), key=_badness, default=None)
 
     def _sets(self, start: States) -> Iterator[list[States]]:
-        """States in which some operations are in another than at the start, size by size, the best agreeing first."""
+        """Yield hypotheses that change the states of a set of operations, size by size, those that agree best first."""
         rest = ContactAgreement(self._case, start)
         seen = [k for k, views in enumerate(self._case.views) if views]
         other = {k: [state for _, state in self._beliefs[k] if state != start[k]][:_MOST_OTHER] for k in seen}
@@ -205,7 +223,12 @@ class Search:
             yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
 
     def _grown(self, size: dict[int, int], rest: ContactAgreement) -> Iterator[list[tuple[int, ...]]]:
-        """Sets of operations by size; not all of them together, but a single one."""
+        """Yield sets of operations in order of their size; never all operations, unless there is only one.
+
+        Args:
+            size: Size for which each operation counts.
+            rest: Agreement of the contacts, by which sets of many operations are grown.
+        """
         if len(size) <= MOST_EXACT:
             every = [s for m in range(1, max(len(size), 2)) for s in combinations(size, m)]
             sizes = {s: sum(size[k] for k in s) for s in every}
@@ -218,17 +241,17 @@ class Search:
             grown = sorted(chosen, key=lambda s: -rest.agreement(s))[:3]
 
     def _size(self, k: int, now: State) -> int:
-        """How many outliers it is worth that operation k is in another state."""
+        """Size for which operation k counts in a set: the surprise of its next state in units of `_BY`, at least 1."""
         known = {state: surprise for surprise, state in self._beliefs[k]}
         least = min((surprise for state, surprise in known.items() if state != now), default=known[now])
         return max(1, round((least - known[now]) / _BY))
 
     def _trusted_state(self, k: int) -> State:
-        """The likeliest state of an operation in which a view is assumed."""
+        """The most likely state of operation k that trusts a view."""
         return next(state for _, state in self._beliefs[k] if INLIER in state)
 
     def _refine(self, best: SolvedHypothesis) -> None:
-        """One state after the other changed for the better, until none is; or relations in place of observations."""
+        """Improve a hypothesis by one change after another, until none makes it more likely or the budget is spent."""
         most = self._looked_at() + _MOST_ALTOGETHER
         while self._looked_at() < most:
             near = [(states, best.dropped) for states in self._near(best)]
@@ -239,7 +262,7 @@ class Search:
             best = better
 
     def _near(self, best: SolvedHypothesis) -> Iterator[States]:
-        """With one view, that is no inlier, in another state; with two exchanged; with some displaced together."""
+        """Yield states that differ in one view that is no inlier, in two swapped views, or in a displaced row."""
         states = best.states
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
             for i, now in enumerate(state):
@@ -254,14 +277,18 @@ class Search:
         yield from displace_together(states)
 
     def _instead(self, best: SolvedHypothesis) -> Iterator[tuple[States, str]]:
-        """A relation in place of an operation that is in doubt and that it depends on."""
+        """Yield states in which an operation in doubt is trusted, with a relation of it to drop instead."""
         doubted = [k for k, state in enumerate(best.states) if any(map(is_false, state))]
         for k in () if best.dropped else doubted:
             states = change_states(best.states, (k,), (self._trusted_state(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
-        """Relations, and single contacts of them, without which the rest agrees; or those an operation is part of."""
+        """Yield relations, and single contacts of them, without which the remaining contacts agree.
+
+        Args:
+            of: Only relations that depend on this operation; None: all.
+        """
         assembly = self._case.observation.assembly
         rest = ContactAgreement(self._case, states)
         letters = find_contact_pattern(assembly).letters - len(assembly.solids)
@@ -276,4 +303,5 @@ class Search:
 
 
 def _badness(solved: SolvedHypothesis) -> float:
+    """The sort key of hypotheses."""
     return solved.badness

@@ -1,7 +1,7 @@
-"""What was observed of each operation, once or several times, and what comes of it if some of that is rejected.
+"""Views of each operation, one or several, and the Gaussian they make together under an assumed state.
 
-Views of one operation that are assumed are merged into one Gaussian. That they agree is evidence that they are right,
-since false views lie anywhere, but for those that repeat the first.
+Trusted views of one operation are merged into one Gaussian. Their agreement is evidence that they are right, since
+false views lie anywhere, unless they repeat the first.
 """
 
 from collections.abc import Sequence
@@ -27,39 +27,47 @@ from apo_bench.correction.robust.beliefs import (
 from apo_bench.geometry import Array, find_approximate_symmetries, pose
 
 _MOST_TOGETHER = 3
-"""Of more views than this only those that agree are assumed together."""
+"""Number of views up to which all subsets are considered; of more, only views that agree are trusted together."""
 _AGREE = 50.0
-"""Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
+"""Squared difference in standard deviations above which two views are not both inliers."""
 _IMPOSSIBLE = 60.0
-"""States that are less likely than the likeliest by so much in -2 log are not looked at."""
+"""Difference in -2 log from the most likely state beyond which a state is not considered."""
 _ITERATIONS = 5
+"""Iterations of the mean of several poses."""
 _EXACT = np.diag(np.repeat([1e-8, 1e-8], 3))
-"""(6, 6): where a part starts is known."""
+"""Covariance of start poses, which are known, (6, 6), [m, rad]."""
 
 
 class Merged(NamedTuple):
-    """What the views of an operation say together if they are in some state."""
+    """The pose that the views of one operation indicate together, under an assumed state."""
 
     goal: Array | None
-    """(4, 4); None if all are rejected."""
+    """(4, 4), world, [m]; None if all views are rejected."""
     covariance: Array
+    """(6, 6), [m, rad]; `ROOM` if all views are rejected."""
     surprise: float
-    """-2 log of how likely such states and views are, relative to one inlier, without contacts."""
+    """-2 log of the probability of state and views, relative to one inlier, without contacts."""
 
 
 Sightings = tuple[tuple[Sighting, ...], ...]
-"""Those of each operation."""
+"""The views of each operation."""
 
 
 def views_of(observation: Observation, model: OutlierModel | None = None) -> Sightings:
-    """What was observed, once at most."""
+    """The views of a first observation, at most one per operation."""
     return add_views(((),) * len(observation.poses), observation, observation, model)
 
 
 def add_views(
     views: Sightings, observation: Observation, first: Observation, model: OutlierModel | None = None
 ) -> Sightings:
-    """With what was observed this time; `first` is the first look, which says where parts were before."""
+    """The views with those of another observation added.
+
+    Args:
+        observation: The new observation; operations that it did not observe get no view.
+        first: The first observation, from which poses before each operation are taken.
+        model: Gives the position of the camera, if known.
+    """
     assembly = observation.assembly
     mains = [operation.main for operation in assembly.operations]
     before = _before(first)
@@ -82,7 +90,7 @@ def add_views(
 
 
 def _before(first: Observation) -> list[tuple[Array, Array] | None]:
-    """Where the part of each operation was before it, and the covariance of that; None if that is not known."""
+    """Pose of the main part before each operation, and its covariance; None if that pose was not observed."""
     now: dict[str, Array | None] = dict.fromkeys(first.start, _EXACT)
     found = list[tuple[Array, Array] | None]()
     where = (first.start, *compute_placements(first.assembly, first.start, first.poses)) if first.start else ()
@@ -97,7 +105,11 @@ def _before(first: Observation) -> list[tuple[Array, Array] | None]:
 def merge_views(
     views: Sequence[Sighting], state: State, model: OutlierModel, exchanged: Sighting | None = None
 ) -> Merged:
-    """What the views of one operation say together; `exchanged` is the view of another one that belongs to this."""
+    """Merge the views of one operation under a state.
+
+    Args:
+        exchanged: The view of another operation that takes the place of a swapped view.
+    """
     pairs = [
         (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
     ]
@@ -115,22 +127,21 @@ def merge_views(
 
 
 def exchanged_with(state: State) -> int | None:
-    """The operation whose first view belongs to one in this state in place of its own."""
+    """The operation with which this state swaps a view; None if it swaps none."""
     return next((swapped_with(belief) for belief in state if belief < 0), None)
 
 
 def exchanged_view(views: Sightings, state: State) -> Sighting | None:
-    """That view."""
+    """The first view of the operation with which this state swaps a view; None if it swaps none."""
     other = exchanged_with(state)
     return None if other is None else views[other][0]
 
 
 def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float, State]]:
-    """States of the views of one operation in which each is right, stale or gross, each with its surprise.
+    """States of the views of one operation, each view inlier, stale or gross, with their surprises; the best first.
 
-    The likeliest is first; those that are out of the question are left out.
-
-    Of equally likely ones that which assumes the latest view: an earlier one was looked at again for a reason.
+    Very unlikely states are left out, but never those that reject all views. Ties go to the state that trusts the
+    latest view, since an operation is observed again for a reason.
     """
     m = len(views)
     groups: set[tuple[int, ...]] = {()}
@@ -150,19 +161,20 @@ def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float,
 
 
 def _false(view: Sighting, model: OutlierModel) -> int:
-    """Whether a view that says nothing is likelier stale, or gross."""
+    """The more likely belief, stale or gross, of a rejected view."""
     if view.before is None:
         return GROSS
     return min((GROSS, STALE), key=lambda belief: surprise((view,), (belief,), model))
 
 
 def _agree(a: Sighting, b: Sighting) -> bool:
+    """Whether two views may both be inliers."""
     xi = pose.log(pose.inverse(a.goal) @ b.goal)
     return float(xi @ np.linalg.solve(a.covariance + b.covariance, xi)) < _AGREE
 
 
 def _mean(views: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, float]:
-    """The most likely pose, its covariance, and the squared length of all deviations from it."""
+    """The most likely pose of several Gaussians, its covariance, and the sum of squared deviations from it."""
     poses = np.array([goal for goal, _ in views])
     W = np.linalg.inv([C for _, C in views])
     C = np.linalg.inv(W.sum(axis=0))

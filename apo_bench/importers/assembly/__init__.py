@@ -1,1 +1,1 @@
-"""Parts and their final poses become a scenario file, and a scenario is checked from end to end."""
+"""Assembly import: turn parts at their final poses into a scenario file, and check a scenario file from end to end."""

@@ -1,7 +1,7 @@
-"""Give play to parts that were drawn without any: mating faces of the smaller part recede.
+"""Add clearance to parts that were drawn line to line: mating faces of the smaller part recede.
 
-Printed and moulded parts are often drawn line to line, or a little inside each other, and physics finds no way in. So
-faces recede to where they only touch, and by the clearance; those of the larger part do if the smaller one is too thin.
+Parts for printing or moulding are often drawn without play, or overlapping a little, and physics then cannot insert
+them. Such faces recede by their overlap and by the clearance. If the smaller part is too thin, the larger one recedes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,23 +17,27 @@ from apo_bench.importers.assembly.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, 
 from apo_bench.scenario.parts.fit import with_fit
 
 MOST_OVERLAP_MM = 0.2
-"""Faces that are deeper in each other do not recede."""
-_DIGITS = 5
+"""Faces with a larger overlap do not recede: they are a press fit or a thread."""
+_DIGITS = 5  # decimals of a depth in mm
 
 
 def add_clearance(
     parts: Sequence[PosedPart], clearance_mm: float, most_mm: float = MOST_OVERLAP_MM
 ) -> tuple[tuple[PosedPart, ...], tuple[str, ...]]:
-    """Return the parts, with more faces that fit than their files mark, and a note for each pair of parts.
+    """Return the parts with the faces that need play marked as fit, and notes on the changes.
 
     Args:
-        clearance_mm: By how much these recede; with none, nothing is changed.
-        most_mm: Faces that are deeper in each other stay where they are; 0: all do.
+        clearance_mm: How far marked faces recede beyond the overlap; 0 changes nothing.
+        most_mm: Faces with a larger overlap stay as drawn; 0 changes nothing.
+
+    Returns:
+        The parts in the given order, and one sentence for each pair of which a part was changed or is too thin.
     """
     changed = {each.name: each for each in parts}
     notes = list[str]()
     for pair in combinations(parts, 2) if most_mm and clearance_mm else ():
         wide, thin = sorted(pair, key=lambda each: -each.solid.volume)
+        # The smaller part recedes if it can; otherwise the larger one.
         for own, other in ((thin, wide), (wide, thin)):
             tight = _tight_faces(own, other, most_mm)
             before = changed[own.name].fit
@@ -56,23 +60,29 @@ def add_clearance(
 
 
 def _tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
-    """Faces of the first part that need play, and how deep each of them is in the second one, [mm]."""
+    """Return the faces of `own` that need play against `other` -> the depth of their overlap, [mm], 0 if none."""
     pairs = facing(own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE)
     gaps = {Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m for each in pairs}
-    gaps = {contact: gap_m for contact, gap_m in gaps.items() if gap_m < NEAR_M}
+    gaps = {contact: gap_m for contact, gap_m in gaps.items() if gap_m < NEAR_M}  # touching or overlapping
     solids = {own.name: own.solid, other.name: other.solid}
     walls = walls_without_play(solids, {own.name: own.T, other.name: other.T}, gaps)
+    # Both walls of a slot without play, even where they do not overlap.
     held = {contact for pair in walls for contact in pair}
     deep = [(c.manipulated.face, -1e3 * gap) for c, gap in gaps.items() if c in held or gap < -NEAR_M]
     deep += _tight_shafts(own, other, gaps, most_mm)
-    # Of a face that touches several the deepest comes last.
+    # A face that mates with several faces recedes by the largest overlap: pairs are sorted, so the deepest wins.
     return {face: round(max(0.0, mm), _DIGITS) for face, mm in sorted(deep)}
 
 
 def _tight_shafts(
     own: PosedPart, other: PosedPart, gaps: Mapping[Contact, float], most_mm: float
 ) -> Iterator[tuple[str, float]]:
-    """Shafts that are as thick as the hole around them, or thicker, and the holes of such."""
+    """Yield round faces of `own` in shaft-hole pairs without play, and their overlap of radii, [mm].
+
+    Args:
+        gaps: The pairs of faces that touch or overlap, face of `own` first.
+        most_mm: Pairs with a larger overlap are left out.
+    """
     for mine, its in gaps:
         a, b = own.solid.face(mine.face), other.solid.face(its.face)
         play_mm = 1e3 * compute_geometric_play(a, b)

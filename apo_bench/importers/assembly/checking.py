@@ -1,4 +1,4 @@
-"""Check whether human and robot can do a scenario, and name the line of its file to change if not."""
+"""Check a scenario file in stages, from syntax to simulated trials, and locate the line to change for each fault."""
 
 import re
 from collections import Counter
@@ -25,10 +25,10 @@ from apo_bench.simulation.execution import compute_transferred_poses, plan_moves
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
 
-_ON_TABLE_M = 1e-4
-_STRUCK_M = 1e-4
+_ON_TABLE_M = 1e-4  # tolerance of "the part stands on the table"
+_STRUCK_M = 1e-4  # depth of the open gripper in another part that counts as a collision
 _SCREW = re.compile(r"(^|_)(m\d+(_|x|$)|screw|bolt|nut(_|$)|thread|spring)", re.IGNORECASE)
-"""Names of parts that are turned or bent, which no trial does."""
+"""Names of screws, nuts and springs: no trial screws or bends parts."""
 _REMEDIES = {
     "collision": "operation {k}, grasp: hold the part elsewhere, or let the struck part start farther away",
     "lost_grasp": "operation {k}, grasp: hold the part elsewhere",
@@ -36,19 +36,19 @@ _REMEDIES = {
     "unreachable": "site: move it nearer to the arm",
     "unreachable_start": "parts, {part}, start: let the part start nearer to the arm",
 }
-"""Outcome of a trial -> what to change."""
+"""Failure code of a trial -> what to change; begins with a location as `_LOCATION` reads it."""
 _LOCATION = re.compile(r"operation (\d+)(?:, (\w+))?|parts, (\w+)(?:, (\w+))?|site\b")
-"""The beginning of a sentence about a scenario file."""
+"""The location in the scenario file with which a sentence begins."""
 
 
 class Finding(NamedTuple):
     """The result of one check."""
 
-    what: str
+    what: str  # the stage: file, parts, starts, ways, play, gripper, reach or oracle
     ok: bool
     sentence: str
     line: int | None = None
-    """Of the file, from 1: what to change."""
+    """The line of the file to change, from 1; None if the sentence names no location."""
 
     def __str__(self) -> str:
         """`wrong  reach    line 41: ...`."""
@@ -58,6 +58,10 @@ class Finding(NamedTuple):
 
 def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "six_axis") -> Iterator[Finding]:
     """Check a scenario file from its syntax to trials in which the robot knows the true poses.
+
+    Args:
+        seeds: Number of trials; 0 runs none.
+        fidelity, arm: As in `TrialConfig`.
 
     Yields:
         Each finding as soon as it is known.
@@ -71,9 +75,9 @@ def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "s
 
 
 def line_of(text: str, sentence: str) -> int | None:
-    """Return the line, from 1, of `operation 2, grasp` or `parts, pin, start` at the beginning of a sentence.
+    """Return the line, from 1, of the entry that a sentence names at its beginning; None if it names none.
 
-    A missing key is in the line of its table.
+    Such beginnings are `operation 2, grasp`, `parts, pin, start` or `site`. A missing key gives the line of its table.
     """
     named = _LOCATION.match(sentence)
     if named is None:
@@ -82,7 +86,7 @@ def line_of(text: str, sentence: str) -> int | None:
     table = "[[operations]]" if operation else f"[parts.{part}]" if part else "[site]"
     lines = text.splitlines()
     heads = [i for i, line in enumerate(lines) if line.startswith(table)]
-    k = int(operation) - 1 if operation else 0
+    k = int(operation) - 1 if operation else 0  # only [[operations]] has several tables of one head
     if not 0 <= k < len(heads):
         return None
     key = operation_key or part_key
@@ -91,6 +95,7 @@ def line_of(text: str, sentence: str) -> int | None:
 
 
 def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Finding]:
+    """Yield the findings of all stages in order; a file that cannot be read or built ends the check."""
     try:
         scenario = load_scenario(path)
     except InputError as error:
@@ -110,6 +115,7 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
     yield from _check("gripper", _room(scenario, scene), "every part can be held and lifted")
     far = list(_reach(scenario, scene))
     yield from _check("reach", far, "the arm reaches every start and goal, wherever the site may be")
+    # If something is out of reach, suggest a place of the site at which everything is in reach.
     if far and (place := place_in_reach(scene, lambda nearer: not any(_reach(nearer.scenario, nearer)))):
         yield Finding("reach", False, place)
     config = TrialConfig(str(path), arm=arm, noise_mm=0.0, noise_deg=0.0, method="oracle", fidelity=fidelity)
@@ -122,12 +128,13 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
 
 
 def _check(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
-    """A finding for each wrong thing, or one that all is well."""
+    """Yield a failed finding for each sentence of `wrong`, or one finding `well` if there is none."""
     findings = [Finding(what, False, sentence) for sentence in wrong]
     yield from findings or [Finding(what, True, well)]
 
 
 def _summary(scenario: Scenario) -> str:
+    """Return the counts of parts, operations and contacts by kind; the table is no part."""
     assembly = scenario.assembly
     contacts = [contact for operation in assembly.operations for contact in operation.contacts]
     kinds = Counter(str(classify_contact(*map(assembly.face_of, contact))) for contact in contacts)
@@ -137,13 +144,16 @@ def _summary(scenario: Scenario) -> str:
 
 
 def _parts(scenario: Scenario) -> Iterator[str]:
+    """Yield a sentence for each part that is a screw, nut or spring by its name."""
     for part in filter(_SCREW.search, scenario.assembly.solids):
         yield f"parts, {part}: nothing is screwed or bent here; leave the part out, or give it another name"
 
 
 def _starts(scenario: Scenario) -> Iterator[str]:
+    """Yield a sentence for each movable part on the table that does not stand stably at its start."""
     for part, solid in scenario.assembly.solids.items():
         T = scenario.start[part]
+        # Lowest point at z = 0; parts in fixtures are higher.
         is_on_table = abs(measure_extent(solid.pieces, T[2, :3])[0] + T[2, 3]) <= _ON_TABLE_M
         if part not in scenario.assembly.fixed and is_on_table and not find_stance(solid, T[:3, :3]).stands:
             yield (
@@ -153,12 +163,14 @@ def _starts(scenario: Scenario) -> Iterator[str]:
 
 
 def _ways(scenario: Scenario) -> Iterator[str]:
+    """Yield a sentence for each operation without a collision-free straight insertion path."""
     for k, each in enumerate(list_nominal_operations(scenario), start=1):
         if not each.after.free:
             yield f"operation {k}, contacts: no straight way leads '{each.main}' to its goal; change the order"
 
 
 def _play(scenario: Scenario) -> Iterator[str]:
+    """Yield a sentence for each pair of opposite flat walls that hold a part without play, neither marked as fit."""
     assembly = scenario.assembly
     stages = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
@@ -170,8 +182,9 @@ def _play(scenario: Scenario) -> Iterator[str]:
 
 
 def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
-    """Grasps between whose pads a part does not lie, and those at which the gripper has no room."""
+    """Yield a sentence for each grasp that does not hold its part, and for each grasp without room for the gripper."""
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True), start=1):
+        # The third row of R is world z in the part frame.
         up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         solid = scenario.assembly.solids[operation.main]
         if not is_held(solid, grasp.point, grasp.across, np.round(up, 9), scene.arm.opening_m):
@@ -179,9 +192,10 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
                 f"operation {k}, grasp: between these pads '{operation.main}' has no opposite faces, and no shaft; "
                 "hold it elsewhere"
             )
+    # The open gripper must not collide with other parts when it takes each part, with the site at its nominal pose.
     layout = place_layout(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
     poses = layout.start
-    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
         operation = scenario.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
         depth, other = struck_by(scene, move.transfer, poses, after)
@@ -194,15 +208,19 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
 
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
-    """Parts out of reach with the site in its middle or at a corner, turned to either end."""
+    """Yield a sentence for each part out of reach, with the site at its centre and at its four corners.
+
+    At the centre the site has its mean yaw, at the corners the lowest or highest yaw. Each fault is told once per part.
+    """
     site = scenario.site
     known = set[tuple[str, str]]()
     low, high = site.yaw_rad
+    # Corners in units of the spread.
     places = {(0, 0, (low + high) / 2), *((i, j, low if i == j else high) for i, j in product((-1, 1), (-1, 1)))}
     for i, j, yaw in sorted(places):
         x, y = np.add(site.center_m, np.multiply((i, j), site.spread_m))
         layout = place_layout(scenario, x, y, yaw, None, scene.clearance_mm)
-        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
             code = solve_key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and (code, part) not in known:
@@ -215,7 +233,11 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
 
 
 def _trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
-    """A sentence for each trial that fails."""
+    """Yield a sentence for each trial that fails.
+
+    Args:
+        config: Settings of the trials; the seed is replaced by 0, 1, ..., `seeds` - 1.
+    """
     for seed in range(seeds):
         record = run_trial(replace(config, seed=seed), scene)
         if record["success"]:

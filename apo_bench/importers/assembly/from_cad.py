@@ -1,4 +1,4 @@
-"""Import the parts of an assembly from CAD files that were drawn in one frame, with the place of every copy."""
+"""Import the parts of an assembly from CAD files with one common frame, with the pose of every copy."""
 
 import shutil
 from collections.abc import Iterator, Sequence
@@ -15,14 +15,14 @@ from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.places import named_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
-_UPRIGHT = 1.0 - 1e-9
+_UPRIGHT = 1.0 - 1e-9  # cosine between axis and z of an upright round face
 _NEAR = 0.005
-"""A share of the width of the box."""
+"""An axis this near to the middle of the box counts as the middle; a share of the box's larger horizontal side."""
 
 
 @contextmanager
 def remove_on_failure(folder: Path) -> Iterator[Path]:
-    """A folder for the parts of an assembly; it is removed again if the import fails and it did not exist before."""
+    """Yield the folder for the parts; if the import fails, remove the folder unless it existed before."""
     existed = folder.exists()
     try:
         yield folder
@@ -39,7 +39,8 @@ def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -
     turns the part about its own frame.
 
     Args:
-        files: One of several solids, or several that were drawn in one frame.
+        files: One file of several solids, or several files with one common frame.
+        unit: Unit of the files; None: as they state.
 
     Returns:
         The file of poses, and a sentence for each part, warning, and face that can make no contact.
@@ -74,9 +75,10 @@ def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -
 
 
 def _foot(raw: RawSolid) -> Array:
-    """The middle of the lower side of the box around a solid, (3,), to a micrometre, [mm].
+    """Return the middle of the lower side of the solid's bounding box, (3,), rounded to a micrometre, [mm].
 
-    An upright axis near it is used instead: facets move the box by a part of their sagitta.
+    If the axis of an upright round face passes near this middle, the axis is used: a coarse mesh of a round face has an
+    asymmetric box.
     """
     low = raw.mesh.corners.min(axis=0)
     high = raw.mesh.corners.max(axis=0)
@@ -88,12 +90,16 @@ def _foot(raw: RawSolid) -> Array:
 
 
 def _shift(raw: RawSolid, by: Array) -> RawSolid:
+    """Move a solid by a vector, (3,), [mm]."""
     mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
     return replace(raw, mesh=mesh, regions=tuple(_shift_region(region, by) for region in raw.regions))
 
 
 def _shift_region(region: Region, by: Array) -> Region:
-    """The point of an axis is the foot of the origin on it."""
+    """Move a region by a vector, (3,), [mm].
+
+    The point of an axis stays the foot of the origin on the axis, so the span along the axis shifts instead.
+    """
     point = region.point + by
     along = float(point @ region.direction) if region.is_round else 0.0
     low, high = region.span

@@ -1,4 +1,4 @@
-"""A scenario file from parts at their final poses."""
+"""Make a scenario file from part files and the final poses of the parts."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,12 +22,12 @@ def scenario_from_poses(
     clearance_mm: float,
     max_overlap_mm: float,
 ) -> NewScenario:
-    """Choose what the poses leave open, and write the scenario file.
+    """Choose base, order, starts and grasps of an assembly, write the scenario file, and return the scenario.
 
     Args:
         poses: A file of `[[pose]]` entries.
-        parts: Part files; empty: as the poses name them.
-        source: What the poses come from, for the file.
+        parts: Part files; empty: part files next to the file of poses.
+        source: Names of the files of the poses, for the header of the scenario file.
         up, fixed, order, clearance_mm, max_overlap_mm: As in `apo_bench.import_assembly`.
     """
     require(up is None or up in UPS, f"up must be one of {', '.join(UPS)}, got {up}.")

@@ -1,4 +1,4 @@
-"""Find where each part of a new scenario is held from above, by the same rules as the robot's."""
+"""Find a grasp from above for each part of a new scenario, with the collision checks of the robot's planner."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,20 +17,22 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import RestingPart, Stroke, find_clear_grasp, list_obstacles, plan_arrival_line
 
-_ARM = "six_axis"
+_ARM = "six_axis"  # the grasps are checked for this arm
 _OVER_M = (0.0, 0.005, 0.0085)
-"""How far tips may be over the top of a part that stands out little; pads hold its uppermost 5 or 1.5 mm then."""
+"""Heights of the fingertips over the top of a part, tried in this order. The last two suit parts that protrude little:
+the pads then hold their uppermost 5 or 1.5 mm.
+"""
 _MOST_HOLDS = 40
-"""The largest number of places that are tried, of each height."""
-_LIFT_M = 0.03
+"""The largest number of places that are tried at each height."""
+_LIFT_M = 0.03  # the straight lift from the start that must be free
 
 
 class FoundGrasps(NamedTuple):
-    """How the parts of a scenario are held."""
+    """The grasps of all moved parts."""
 
-    grasps: Mapping[str, Grasp | None]
+    grasps: Mapping[str, Grasp | None]  # None: no place can be held from above
     crowded: frozenset[str]
-    """Parts that offer places, of which none has room."""
+    """Parts with places to hold, none of which has room for the gripper; their grasp is the best place nevertheless."""
 
 
 def find_grasps(
@@ -41,24 +43,29 @@ def find_grasps(
     order: Sequence[Placing],
     base: Sequence[str],
 ) -> FoundGrasps:
-    """Return the best place of each part at which the gripper has room: at its start, at its goal and on its way in.
+    """Return the best grasp of each moved part that is free at its start, at its goal and along its insertion path.
 
     Args:
-        starts: Of every part and fixture, world.
-        fixtures: Part -> its fixture at the start.
+        poses: Final pose of every part, world, [m].
+        starts: Start pose of every part and fixture, world, [m].
+        fixtures: Part -> the fixture that carries it at its start.
+        order: The operations in their order.
+        base: The fixed parts.
     """
     arm = find_arm(_ARM)
     kinematics = Kinematics(arm)
     best: dict[str, Grasp | None] = {}
     crowded = set[str]()
+    # The poses before the operation, of the parts that are assembled.
     now = {part: np.array(poses[part]) for part in (TABLE, *base)}
     for placing in order:
         main = placing.moves[0]
         solid = solids[main]
         fixture = {fixtures[main].name: fixtures[main]} if main in fixtures else {}
         at_start = {TABLE: now[TABLE], **{name: starts[name] for name in (main, *fixture)}}
+        # A part that was put down before, as the base of a sub-assembly, is taken from there and not from its start.
         taken = _resting({**solids, **fixture}, main, now if main in now else at_start, placing.moves)
-        T = placing.at @ pose.inverse(poses[main])
+        T = placing.at @ pose.inverse(poses[main])  # moves all carried parts rigidly to the goal of the operation
         now |= {part: T @ poses[part] for part in placing.moves}
         goal = _resting(solids, main, now, placing.moves)
         lift = Stroke(taken.T, -UP, _LIFT_M, taken.around)
@@ -66,6 +73,7 @@ def find_grasps(
         places = [*_places_from_above(solid, taken.T, arm.opening_m)]
         clear = (find_clear_grasp(kinematics, solid, grasps, (taken, goal), strokes) for grasps in places)
         best[main] = next((grasp for grasp in clear if grasp is not None), None)
+        # Without room for the gripper, keep the best place: a person may change it in the file.
         if best[main] is None and (offered := find_holds(solid, _up(goal.T), arm.opening_m)):
             best[main] = _grasp(offered[0])
             crowded.add(main)
@@ -73,25 +81,38 @@ def find_grasps(
 
 
 def _resting(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:
+    """Return a part at rest and the obstacles around it: all parts of `at` but the moved ones."""
     return RestingPart(at[part], list_obstacles({name: solids[name] for name in at}, at, moves))
 
 
 def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: RestingPart) -> Stroke:
-    """The way in."""
+    """Return the straight insertion path to the goal, and the obstacles at the goal.
+
+    Args:
+        now: Pose of every part after the operation.
+        goal: The main part at its goal, with the obstacles there.
+    """
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
     line = plan_arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
 def _places_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator[list[Grasp]]:
-    """Places of one height of the tips over the part after the other."""
+    """Yield the grasps from above for each height of the fingertips over the part, best first within each height.
+
+    Args:
+        T: (4, 4), pose of the part in the world.
+    """
     up = _up(T)
     for over in _OVER_M:
         yield [_grasp(hold) for hold in _best_of_each_height(find_holds(solid, up, opening_m, over), up)]
 
 
 def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:
-    """The first places of each height: the highest are the worst, and may be the only ones with room."""
+    """Yield at most `_MOST_HOLDS` places of each height, from places sorted best first.
+
+    Every height is kept, since a high place, though a worse hold, may be the only one with room.
+    """
     counts = Counter[float]()
     for place in places:
         height = round(float(place.point @ up), 6)
@@ -101,6 +122,7 @@ def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadP
 
 
 def _up(T: Array) -> Array:
+    """Return the world's vertical in the frame of a part at T, (3,)."""
     return np.round(T[2, :3], 9)
 
 

@@ -1,4 +1,4 @@
-"""Make a scenario of posed parts: contacts, an order, starts and grasps."""
+"""Make a scenario from parts at their final poses: choose contacts, order, starts, fixtures and grasps."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,37 +19,37 @@ from apo_bench.importers.cad.solids import find_free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site
 
-_LOW_M = 1e-4
+_LOW_M = 1e-4  # parts this close to the lowest one stand on the table too
 _PLAY_M = 1e-3
-"""Flat walls that are closer to each other were drawn as a fit."""
-_GROUP_ROOM_M = 0.05
-_FARTHEST_ASIDE_M = 0.26
+"""Opposite flat walls with a gap below this were drawn as a fit with play."""
+_GROUP_ROOM_M = 0.05  # between the assembly and a sub-assembly next to it
+_FARTHEST_ASIDE_M = 0.26  # largest distance of a sub-assembly from the assembly
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class NewScenario:
-    """A scenario, before it is written."""
+    """A new scenario before it is written to a file."""
 
     parts: tuple[PosedPart, ...]
-    """At the poses at which all contacts are closed."""
+    """The parts at the poses at which all contacts are closed, on the table."""
     fixed: tuple[str, ...]
-    why_fixed: str
+    why_fixed: str  # the reason for the choice of the fixed parts, for a comment
     order: tuple[Placing, ...]
     starts: Mapping[str, Array]
-    """(4, 4), world, [m]; of fixed parts in the frame of the assembly. Of fixtures too."""
-    stances: Mapping[str, Stance]
+    """Part or fixture -> its start pose, (4, 4), world; of fixed parts the pose in the frame of the assembly, [m]."""
+    stances: Mapping[str, Stance]  # moved part -> how it stands at its start
     fixtures: Mapping[str, Solid]
-    """Part -> the fixture that carries it at its start, as it does not stand alone."""
-    grasps: Mapping[str, Grasp | None]
+    """Part -> the fixture that carries it at its start; only parts that do not stand on their own."""
+    grasps: Mapping[str, Grasp | None]  # moved part -> its grasp, None without a place to hold
     site: Site
-    clearance_mm: float
+    clearance_mm: float  # clearance per side of faces marked as fit
     notes: tuple[str, ...]
-    """For a person, one sentence each."""
+    """Notes for the user, one sentence each; they become comments of the file."""
     unfit: tuple[str, ...]
-    """The notes on parts that the robot cannot hold."""
+    """The notes on parts that the robot cannot grasp, also among `notes`."""
     up: str = "z"
-    """The axis of the given poses that is up, and why."""
+    """The axis of the given poses that is up, and the reason for it."""
 
 
 class NoAssemblyOrder(RuntimeError):
@@ -62,12 +62,12 @@ def new_scenario(
     clearance_mm: float = 0.25,
     wanted_order: Sequence[str] = (),
 ) -> NewScenario:
-    """Make a scenario of parts that stand on the table as `on_the_table` puts them.
+    """Make a scenario from parts that stand on the table as `on_the_table` puts them.
 
     Args:
-        fixed: Parts that stay where they are; none: the largest of the lowest.
-        clearance_mm: Room per side of faces that their part files mark as fit.
-        wanted_order: The moved parts in their order; none: any order.
+        fixed: Names of parts that stay in place; empty: the largest of the lowest parts.
+        clearance_mm: Clearance per side of faces that part files mark as fit.
+        wanted_order: The moved parts in the wanted order; empty: any order.
 
     Raises:
         InputError: No part has that name, there is no room on the table, or the wanted order is impossible.
@@ -112,12 +112,13 @@ def new_scenario(
         f"in the order {', '.join(wanted_order)} these parts cannot be put together; {', '.join(mains)} can be: name "
         "every part once that is not fixed, an inner part before the outer one.",
     )
-    # The site of the assembly is kept free, and of a sub-assembly that is put together next to it.
+    # Keep starts clear of the site of the assembly, and of the place next to it where a sub-assembly is put together.
     is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
     site = choose_site(reach, is_beside)
     middles = [site.center_m, site.center_m + aside[:2]] if is_beside else [site.center_m]
     kept_free = [(np.array(middle), reach + max(site.spread_m)) for middle in middles]
     turns = {each.name: poses[each.name][:3, :3] for each in parts if each.name not in base}
+    # Each part starts in its final orientation.
     stances = {part: find_stance(solids[part], R) for part, R in turns.items()}
     starts = {part: np.array(poses[part]) for part in (*base, *turns)}
     fixtures = {}
@@ -156,7 +157,11 @@ def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
 
 
 def _unfit(solids: Mapping[str, Solid], turns: Mapping[str, Array], found: FoundGrasps) -> Iterator[str]:
-    """A note for each part that cannot be held."""
+    """Yield a note for each part that the robot cannot grasp, with its size as it stands.
+
+    Args:
+        turns: Part -> its orientation, (3, 3).
+    """
     for part, R in turns.items():
         if part in found.crowded:
             yield f"the gripper has no room to hold '{part}' from above; let it stand out higher, or give it a handle"

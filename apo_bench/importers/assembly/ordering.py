@@ -1,8 +1,8 @@
-"""Find an order in which parts can be put together: the finished assembly is taken apart, and read backwards.
+"""Find an assembly order by disassembly: remove parts from the finished assembly, then reverse the removals.
 
-A part can leave if a straight way out of all its contacts is free, also for the hand above it, and if the part, put
-back, would rest on the others. Where no part can leave alone, connected parts leave as one group: they are put together
-next to the assembly first, on the table.
+A part can be removed if two conditions hold: the straight path out of its contacts is free, also for the hand above;
+and the part would rest stably when put back. If no single part can be removed, a connected group is removed as a sub-
+assembly, which is put together next to the assembly first.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,19 +22,19 @@ from apo_bench.planning.insertion.macros import UP
 from apo_bench.planning.prediction.stability import BALANCED, imbalance
 
 _FALLS_M = 7e-4
-"""A part that hangs in a hole falls by its play."""
+"""Largest drop of a part that still counts as carried: a part in a hole drops by its play."""
 _CARRIES = 1e-3
-"""Of the normal of a contact that carries, upwards."""
+"""A contact carries weight if the vertical component of its normal is at least this."""
 _MOST_SETS = 4000
-"""The search ends after this number of sets of parts."""
-_LARGEST_GROUP = 4
+"""The search ends after this number of sets of parts without an order."""
+_LARGEST_GROUP = 4  # parts in a sub-assembly
 
 
 class RemovalObstacle(NamedTuple):
-    """Why a part cannot leave."""
+    """Why a part cannot be removed."""
 
     passed: int
-    """The number of tests of `_leave` that it passed."""
+    """How many tests of `_leave` the part passed, 0 to 3."""
     reason: str
 
 
@@ -42,44 +42,44 @@ class Placing(NamedTuple):
     """One operation of the order that was found."""
 
     moves: tuple[str, ...]
-    """The main part first."""
+    """The moved parts: the main part, which is held, then the carried ones."""
     contacts: tuple[Contact, ...]
-    """Of the moved parts, in this order, on the others."""
+    """Contacts between moved parts and the others, the face of the moved part first."""
     at: Array
-    """(4, 4), where the main part goes, frame of the assembly, [m]."""
+    """(4, 4), goal of the main part in the frame of the assembly, [m]."""
     why: str
-    """In words: its direction, and the parts that carry it."""
+    """The reason as a phrase: the direction of insertion and the parts that carry the main part."""
 
 
 @final
 @dataclass
 class OrderSearch:
-    """The search for an order, and the obstacles on its way."""
+    """Depth-first search for an assembly order, which remembers failed sets of parts and why parts were stuck."""
 
     solids: Mapping[str, Solid]
-    """All of them, the table too."""
-    poses: Poses
+    """All parts by name, the table too."""
+    poses: Poses  # final poses
     contacts: tuple[Contact, ...]
     aside: Array
-    """(3,): where a sub-assembly is put together, from its place in the assembly, level, [m]."""
+    """(3,), offset from the assembly to the place of sub-assemblies, horizontal, [m]."""
     wanted: Sequence[str] = ()
-    """Parts in the order in which they are put, where that is possible."""
-    failed: set[frozenset[str]] = field(default_factory=set)
+    """The moved parts in the wanted order, which is followed where possible."""
+    failed: set[frozenset[str]] = field(default_factory=set)  # sets of parts that have no order
     obstacles: dict[str, RemovalObstacle] = field(default_factory=dict)
-    """Part -> why it could not leave, where it passed most tests."""
+    """Part -> its obstacle in the attempt in which it passed most tests."""
     left: frozenset[str] = frozenset()
-    """The fewest parts of which none could leave."""
+    """The smallest set of parts reached of which none could be removed."""
 
     def find(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
-        """Return the operations that put all parts where they belong; None if there is no such order."""
+        """Return the operations that assemble all parts in order; None if there is no such order."""
         return self._order_of(frozenset(self.solids), fixed | {TABLE})
 
     def stuck(self) -> list[str]:
-        """Return why each of the fewest parts that are left cannot leave, one sentence each."""
+        """Return one sentence for each part of the smallest stuck set: why the part cannot be removed."""
         return [obstacle.reason for part, obstacle in self.obstacles.items() if part in self.left]
 
     def _order_of(self, there: frozenset[str], base: frozenset[str]) -> tuple[Placing, ...] | None:
-        """The order of the parts in `there`, of which those in `base` are there already."""
+        """Return the operations that lead from `base` to the parts in `there`; None if there is no order."""
         if there == base:
             return ()
         if there in self.failed or len(self.failed) > _MOST_SETS:
@@ -87,13 +87,19 @@ class OrderSearch:
         for placing in self._leaving(there, base):
             before = self._order_of(there - set(placing.moves), base)
             if before is not None:
+                # Never None here: `_leaving` tests it.
                 beside = self._put_together_beside(placing.moves) if len(placing.moves) > 1 else None
                 return (*before, *(beside or ()), placing)
         self.failed.add(there)
         return None
 
     def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
-        """The parts that can leave, straight up from the top first; groups only where no part can."""
+        """Yield the possible removals, the best first; groups only if no single part can be removed.
+
+        Args:
+            there: The parts that are assembled, the base too.
+            base: Parts that never leave.
+        """
         free = [part for part in self.solids if part in there - base]
         single = []
         for part in free:
@@ -110,11 +116,15 @@ class OrderSearch:
             placing = self._leave(group, there) if self._is_connected(group) else None
             if isinstance(placing, Placing) and self._put_together_beside(group) is not None:
                 yield placing
+        # Reached if no group led to an order either: remember the smallest stuck set for the error message.
         if not self.left or len(free) < len(self.left):
             self.left = frozenset(free)
 
     def _lateness(self, placing: Placing) -> tuple[float, ...]:
-        """The last part comes first: from above before from the side, the highest first."""
+        """Return the sort key of a removal; the smallest is removed first, thus assembled last.
+
+        Parts late in the wanted order come first, then insertions from above, then the highest, then the smallest.
+        """
         part = placing.moves[0]
         low, _ = measure_extent(self.solids[part].pieces, self.poses[part][2, :3])
         return (
@@ -125,7 +135,12 @@ class OrderSearch:
         )
 
     def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | RemovalObstacle:
-        """Return how parts come to their places last of all that are there, or why they cannot."""
+        """Return the operation that adds `moves` last to the other parts in `there`, or the obstacle.
+
+        Args:
+            moves: The parts that leave together, the main part first.
+            there: The parts that are assembled, `moves` too.
+        """
         rest = [part for part in self.solids if part in there and part not in moves]
         main = moves[0]
         poses = self.poses
@@ -134,8 +149,8 @@ class OrderSearch:
         contacts = tuple(Contact(a, b) for a, b in pairs if a.part in moves and b.part in rest)
         others = ", ".join(dict.fromkeys(of.part for contact in contacts for of in contact if of.part in rest))
         assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
-        # A part that is put back must rest: another is below it, and its weight is over the parts that carry it. The
-        # macros of its contacts give a straight way, which must be free.
+        # A part that is put back must have another one below and its weight over the parts that carry it. Then the
+        # contact macros give a straight path, which must be free.
         if not contacts:
             return RemovalObstacle(0, f"'{main}' touches nothing that would be there before it")
         if (
@@ -152,13 +167,16 @@ class OrderSearch:
             return RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
         if not arrival.free:
             return RemovalObstacle(3, f"'{main}' cannot leave {others}")
-        way = poses[main][:3, :3] @ arrival.line.direction
+        way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
         return Placing(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
 
     def _put_together_beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
-        """Return how a group is put together next to the assembly, its main part on the table."""
+        """Return the operations that assemble a group next to the assembly, its main part on the table.
+
+        None if the main part does not stand stably on the table, or if the group has no order.
+        """
         main = group[0]
         stance = find_stance(self.solids[main], self.poses[main][:3, :3])
         if not stance.stands or stance.rolls:
@@ -174,7 +192,7 @@ class OrderSearch:
         return None if rest is None or not isinstance(first, Placing) else (first, *rest)
 
     def _is_connected(self, group: Sequence[str]) -> bool:
-        """Whether each part of a group is reached from the first by contacts within the group."""
+        """Whether contacts within the group connect each part of the group to the first one."""
         known = {group[0]}
         for _ in group:
             for a, b in self.contacts:

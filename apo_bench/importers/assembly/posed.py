@@ -1,4 +1,4 @@
-"""Parts at their final poses, read from a file of poses with one table per copy of a part."""
+"""Read parts at their final poses from a file with one `[[pose]]` table per copy of a part."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,33 +15,34 @@ from apo_bench.io import FileTable, read_typed
 from apo_bench.scenario.parts import find_part_path, load_part
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
-TABLE = "table"
+TABLE = "table"  # name of the part that stands for the table
 _TAKEN = (TABLE, "arm")
-"""Names that a part of the scenario cannot have."""
-_MOST = 49
-_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+"""Names that no part of a scenario may have."""
+_MOST = 49  # parts in a file
+_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]  # a color component
+# Axis of the poses that is up -> index and sign.
 UPS = {"x": (0, 1), "y": (1, 1), "z": (2, 1), "-x": (0, -1), "-y": (1, -1), "-z": (2, -1)}
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PosedPart:
-    """One copy of a part, where it is in the finished assembly."""
+    """One copy of a part at its pose in the finished assembly."""
 
     name: str
     file: Path
     solid: Solid
     T: Array
-    """(4, 4), in the frame of the assembly, [m]."""
+    """(4, 4), pose in the frame of the assembly, [m]."""
     color: tuple[float, ...] | None = None
     fit: Mapping[str, float] = field(default_factory=dict)
-    """More faces that fit than the part file marks -> by how much they recede before the clearance, [mm]."""
+    """Faces to mark as fit beyond those of the part file -> depth by which each recedes before the clearance, [mm]."""
     title: str = ""
-    """Its name in the CAD file, where that cannot be its name here."""
+    """The name in the CAD file, if a part cannot have that name in a scenario."""
 
 
 class _Pose(FileTable, frozen=True):
-    """One table of a file of poses."""
+    """One `[[pose]]` table of a file of poses; an empty name means the name of the part."""
 
     part: str
     at_mm: tuple[float, float, float]
@@ -58,10 +59,10 @@ class _PoseFile(FileTable, frozen=True):
 
 
 def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
-    """Read every copy of a part that a file of poses names.
+    """Read every copy of a part that a file of poses names, each with a unique name.
 
     Args:
-        files: Part files, or names of parts of the package. Other part files are next to the file of poses.
+        files: Part files, or names of packaged parts. Other parts are read from part files next to the file of poses.
 
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
@@ -85,12 +86,13 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
-    """Return the same assembly, upright, its lowest point on the table, its middle over the origin.
+    """Return the assembly turned upright, its lowest point on the table, the middle of its box over the origin.
 
     Args:
         up: The axis of the poses that points up, of `UPS`.
     """
     axis, sign = UPS[up]
+    # The rotation, in degrees about x, y and z, that turns the axis up.
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
     low, high = measure_world_bounds([(each.solid, turned @ each.T) for each in parts])
     shift = pose.at([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])

@@ -1,7 +1,7 @@
-"""Find the faces that touch at the given poses, and the poses at which they touch exactly.
+"""Find the contacts of an assembly at given poses, and adjust the poses until all contacts are closed.
 
-Poses are exact but for the digits of a file and of a fit, so a face touches where its plane or axis lies within
-0.05 mm. Then all parts but the fixed ones move, each as little as possible, until every contact is closed.
+Poses of a file and fitted faces are rounded, so faces within 0.05 mm count as touching. Then all parts but the fixed
+ones move by the least amount that closes every contact.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,24 +23,22 @@ from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Solid, measure_intrusion, measure_mate, pose
 from apo_bench.scenario.checks import DEEP_M
 
-NEAR_M = 5e-5
-NEAR_RAD = 2e-3
-SHARE = 0.02
-"""Limits of a contact at the given poses: gap, angle, share of the face."""
-_CLOSED_M = 5e-7
-_CLOSED_RAD = 1e-4
-"""Limits of a closed contact."""
-_ROUNDS = 8
+NEAR_M = 5e-5  # largest gap of a contact at the given poses
+NEAR_RAD = 2e-3  # largest angle between its faces
+SHARE = 0.02  # smallest overlap, as a share of the smaller face
+_CLOSED_M = 5e-7  # largest gap of a closed contact
+_CLOSED_RAD = 1e-4  # largest angle of a closed contact
+_ROUNDS = 8  # Gauss-Newton iterations
 _ARM_M = 0.05
-"""The arm by which a turn counts as a length."""
-NO_PLAY_MM = 1e-3
-_COAXIAL_M = 1e-4
+"""Lever arm that converts rotations to lengths."""
+NO_PLAY_MM = 1e-3  # a shaft and a hole have no play if theirs is at most this
+_COAXIAL_M = 1e-4  # largest offset of the axes of a shaft in its hole
 _THREAD_M = 2.5e-3
-"""A shaft that is thicker than the hole around it by no more than this is pressed in, or has a thread."""
+"""A shaft up to this much larger in radius than its hole is a press fit or a thread; beyond it, another feature."""
 
 
 def find_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR_M) -> tuple[Contact, ...]:
-    """Return every pair of faces of different parts that touch, or are no farther apart, in the order of the parts."""
+    """Return the pairs of faces of different parts whose gap is at most `gap_m`, in the order of the parts."""
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
         for a, b in combinations(solids, 2)
@@ -51,7 +49,11 @@ def find_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR
 def close_contacts(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact], fixed: Iterable[str]
 ) -> tuple[Poses, tuple[Contact, ...], tuple[Contact, ...]]:
-    """Return poses at which contacts are closed, these contacts, and those that contradict them."""
+    """Close contacts by small motions of the parts that are not fixed.
+
+    Returns:
+        The poses at which contacts are closed, the contacts that are closed, and those that contradict them.
+    """
     kept = list(contacts)
     dropped = list[Contact]()
     free = [part for part in solids if part not in set(fixed)]
@@ -60,12 +62,16 @@ def close_contacts(
         off = [_openness(solids, solved, contact) for contact in kept]
         if not kept or max(off) <= 1.0:
             return solved, tuple(kept), tuple(dropped)
-        # Contacts contradict each other: the one that is left farthest open goes, and all are closed again.
+        # Contacts contradict each other: drop the one with the largest residual, and solve again.
         dropped.append(kept.pop(int(np.argmax(off))))
 
 
 def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
-    """Return a sentence for each pair of parts that are inside each other, press fits and threads too."""
+    """Return a sentence for each pair of parts that overlap, press fits and threads included.
+
+    Args:
+        clearance_mm: Clearance per side of faces marked as fit.
+    """
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep_m = measure_intrusion(solids[a], poses[a], solids[b], poses[b])
@@ -80,8 +86,8 @@ def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float)
 def walls_without_play(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact]
 ) -> tuple[tuple[Contact, Contact], ...]:
-    """Opposite flat walls of one part that hold another one between them, none of which recedes."""
-    flat = [c for c in contacts if all(of.face in solids[of.part].faces for of in c)]
+    """Return pairs of contacts at opposite flat walls that enclose a part without play, none marked as fit."""
+    flat = [c for c in contacts if all(of.face in solids[of.part].faces for of in c)]  # flat on flat only
     firm = [c for c in flat if not any(solids[of.part].faces[of.face].fit for of in c)]
     return tuple(
         (contact, opposite)
@@ -92,7 +98,7 @@ def walls_without_play(
 
 
 def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Array:
-    """Of the face of the part that comes first by its name, world, (3,)."""
+    """Return the normal of one face of a contact, (3,), world: of the part whose name sorts first."""
     of = min(contact)
     return np.asarray(poses[of.part][:3, :3] @ solids[of.part].faces[of.face].normal)
 
@@ -100,10 +106,11 @@ def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Arra
 def _tight_fit(
     solids: Mapping[str, Solid], poses: Poses, pair: tuple[str, str], clearance_mm: float, deep_m: float
 ) -> str:
-    """A sentence on a shaft without play in the hole around it; empty if there is none, or if it ends before the hole.
+    """Return a sentence about a shaft without play in its hole, for a pair of parts; empty if there is none.
 
     Args:
-        deep_m: How deep the parts are in each other.
+        clearance_mm: Added to the play of faces marked as fit.
+        deep_m: Depth of the overlap of the two parts; a shaft thicker than its hole by more than this ends before it.
     """
     a, b = pair
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
@@ -121,12 +128,17 @@ def _tight_fit(
 
 
 def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
-    """Gauss-Newton with the least motion: residuals of all contacts, twists of all parts that are free to move."""
+    """Return poses at which all contacts are closed, by Gauss-Newton steps of least motion.
+
+    Args:
+        contacts: Their residuals are the equations.
+        free: Parts that move; a twist of each is an unknown.
+    """
     now = {part: np.array(T) for part, T in poses.items()}
-    first = {part: 6 * i for i, part in enumerate(free)}
+    first = {part: 6 * i for i, part in enumerate(free)}  # part -> its first column
     for _ in range(_ROUNDS):
-        # Rows J and values e of all residuals, tilts times an arm, so that all are lengths; moving a by a twist opens a
-        # contact as much as moving b by it closes it.
+        # Rows J and values e of all residuals; tilts are multiplied by the lever arm, so that all are lengths. A twist
+        # of part a changes a residual as the opposite twist of part b does, hence the signs.
         rows = list[Array]()
         values = list[Array]()
         for contact in contacts:
@@ -146,7 +158,7 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
         W = np.tile([1.0, 1.0, 1.0, 1 / _ARM_M, 1 / _ARM_M, 1 / _ARM_M], len(free))
         try:
             x = W * np.linalg.lstsq(np.concatenate(rows) * W, -np.concatenate(values), rcond=1e-9)[0]
-        except np.linalg.LinAlgError:  # contacts that contradict each other: what is farthest open goes
+        except np.linalg.LinAlgError:  # `close_contacts` drops a contact then
             break
         for part, at in first.items():
             now[part] = pose.exp(x[at : at + 6]) @ now[part]
@@ -154,7 +166,10 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
 
 
 def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> FacingPair | None:
-    """How the two faces of a contact face each other; None if they do not."""
+    """Return gap, angle and residuals of the two faces of a contact; None if the faces do not overlap.
+
+    Limits are wider than those of a contact, since contacts open while others are closed.
+    """
     a, b = contact
     pairs = facing(
         solids[a.part],
@@ -169,9 +184,10 @@ def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Faci
 
 
 def _openness(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
-    """How far a contact is from closed, 1 being as far as a scenario allows."""
+    """Return how far a contact is from closed: at most 1 if closed, inf if the faces do not overlap."""
     each = _facing(solids, poses, contact)
     if each is None:
         return np.inf
+    # The angle of a cone on a rim is free.
     is_on_rim = classify_contact(*map(Assembly(solids, (), frozenset()).face_of, contact)) == "cone on rim"
     return max(abs(each.gap_m) / _CLOSED_M, 0.0 if is_on_rim else each.angle_rad / _CLOSED_RAD)

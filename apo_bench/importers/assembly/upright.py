@@ -1,4 +1,4 @@
-"""Choose which axis of an assembly is up, and on which of its parts it is built: as stated, or what works first."""
+"""Choose the up axis and the base part of an assembly: as stated, or the first choice that works."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -9,8 +9,8 @@ from apo_bench.importers.assembly.added_clearance import MOST_OVERLAP_MM, add_cl
 from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, lowest, new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
 
-_UP_AXES = ("z", "-z", "x", "-x", "y", "-y")
-_MOST_BASES = 3
+_UP_AXES = ("z", "-z", "x", "-x", "y", "-y")  # in the order of the attempts
+_MOST_BASES = 3  # of the lowest parts that are tried as base
 
 
 def new_upright_scenario(
@@ -21,13 +21,13 @@ def new_upright_scenario(
     most_overlap_mm: float = MOST_OVERLAP_MM,
     wanted_order: Sequence[str] = (),
 ) -> NewScenario:
-    """Make a scenario of an assembly, with an axis of its poses up.
+    """Make a scenario from an assembly with one axis of its poses up.
 
     Args:
-        up: An axis of `posed.UPS`; None: z, or the axis with the fewest parts that cannot be held.
-        clearance_mm: Room per side of faces that fit.
-        most_overlap_mm: Parts without play get some where they are no deeper in each other; 0: none do.
-        wanted_order: The moved parts in their order; none: any order.
+        up: A key of `posed.UPS`; None: z, or the axis with the fewest parts that cannot be grasped.
+        clearance_mm: Clearance per side of faces that fit.
+        most_overlap_mm: Parts without play get clearance if they overlap by no more than this; 0: none does.
+        wanted_order: The moved parts in the wanted order; empty: any order.
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
@@ -43,10 +43,10 @@ def new_upright_scenario(
             failed[axis] = error
             continue
         found[axis] = replace(scenario, notes=(*notes, *scenario.notes))
-        if not scenario.unfit:
+        if not scenario.unfit:  # all parts can be grasped, so no other axis is tried
             break
     if not found:
-        raise next(iter(failed.values()))
+        raise next(iter(failed.values()))  # that of the first axis
     best = min(found, key=lambda axis: len(found[axis].unfit))
     if up or best == "z":
         return replace(found[best], up=f"{best}, as asked" if up else best)
@@ -57,7 +57,7 @@ def new_upright_scenario(
 def _on_a_base(
     parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float, wanted_order: Sequence[str]
 ) -> NewScenario:
-    """The scenario on the fixed parts, or on the largest of the lowest parts with which there is an order."""
+    """Make the scenario on the fixed parts, or on the largest of the lowest parts for which an order exists."""
     try:
         return new_scenario(parts, fixed, clearance_mm, wanted_order)
     except NoAssemblyOrder:

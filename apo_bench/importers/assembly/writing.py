@@ -1,4 +1,4 @@
-"""Write a new scenario as a file with a comment for each choice."""
+"""Write a new scenario to a TOML file with a comment on each choice."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from apo_bench.io import clean, write_file
 from apo_bench.records import Thresholds
 from apo_bench.scenario.parts import find_part_path, list_part_names
 
-_WIDTH = 118
+_WIDTH = 118  # longest line of contacts
 THRESHOLDS = {
     "fit_margin_mm": "gap of parts that fit beyond their play",
     "support_mm": "gap of other contacts",
@@ -28,26 +28,31 @@ THRESHOLDS = {
     "loose_gap_mm": "gap of the loose verdict",
     "loose_angle_deg": "angle of the loose verdict",
 }
-"""Threshold -> its meaning; all as in the scenarios of the package."""
+"""Threshold -> its meaning, for comments; values are the defaults of the packaged scenarios."""
 
 
 def write_scenario(new: NewScenario, path: Path, title: str, source: str) -> None:
-    """Write the scenario file, and the part files of fixtures next to it."""
+    """Write the scenario file, and the part files of its fixtures next to it.
+
+    Args:
+        title, source: As in `scenario_text`.
+    """
     for fixture in new.fixtures.values():
         write_file(_fixture_file(path, fixture), fixture_xml(fixture))
     write_file(path, scenario_text(new, title, source, path))
 
 
 def _fixture_file(path: Path, fixture: Solid) -> Path:
+    """Return the path of the part file of a fixture, next to the scenario file."""
     return path.with_name(f"{path.stem}_{fixture.name}.xml")
 
 
 def scenario_text(new: NewScenario, title: str, source: str, path: Path) -> str:
-    """Return the text of the file.
+    """Return the text of the scenario file.
 
     Args:
-        source: The names of the files of the poses.
-        path: Of the file; part files are named relative to it.
+        source: Names of the files of the poses, for the header.
+        path: Path of the scenario file; part files are named relative to its folder.
     """
     lines = [
         f"# Written by `apo-bench scenario new` from {source}. `scenario check` tests every change of this file.",
@@ -85,7 +90,7 @@ def scenario_text(new: NewScenario, title: str, source: str, path: Path) -> str:
 
 
 def choice_lines(new: NewScenario) -> Iterator[str]:
-    """Return the choices and the notes, for a person."""
+    """Yield the choices of the import and its notes as lines for the terminal."""
     yield f"up: {new.up}"
     yield f"fixed: {', '.join(new.fixed)} ({new.why_fixed})"
     for k, placing in enumerate(new.order, start=1):
@@ -95,6 +100,11 @@ def choice_lines(new: NewScenario) -> Iterator[str]:
 
 
 def _part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str]:
+    """Yield the lines of the tables of one part: file, color, start and faces that fit.
+
+    Args:
+        folder: The folder of the scenario file.
+    """
     yield f"[parts.{each.name}]" + (f"  # {clean(each.title)}" if each.title else "")
     is_packaged = each.file.stem in list_part_names() and find_part_path(each.file.stem) == each.file
     file = each.file.stem if is_packaged else Path(os.path.relpath(each.file, folder)).as_posix()
@@ -111,6 +121,7 @@ def _part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str
 
 
 def _operation_lines(new: NewScenario, placing: Placing) -> Iterator[str]:
+    """Yield the lines of one operation: moved parts, goal, contacts and grasp."""
     main = placing.moves[0]
     yield f"[[operations]]  # {placing.why}"
     yield f'move = "{main}"'
@@ -125,7 +136,7 @@ def _operation_lines(new: NewScenario, placing: Placing) -> Iterator[str]:
         wide = f"{2e3 * (hold.half_width or 0.0):.4g} mm between the fingers"
         yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
         return
-    # Level directions of the world in the frame of the part: across the narrower one, at the middle.
+    # No grasp was found: write one at the centre of mass, across the narrower horizontal side, for a person to edit.
     solid = next(each.solid for each in new.parts if each.name == main)
     level = new.starts[main][:2, :3]
     across = level[int(np.argmin(np.ptp(solid.bounds @ level.T, axis=0)))]
@@ -134,20 +145,23 @@ def _operation_lines(new: NewScenario, placing: Placing) -> Iterator[str]:
 
 
 def _quote(text: str) -> str:
+    """Return a TOML string."""
     return json.dumps(text, ensure_ascii=False)
 
 
 def _pose(T: Array) -> str:
+    """Return the TOML table of a pose (4, 4), [m]: position in mm, rotation in degrees if there is any."""
     turn = pose.turn_deg(T)
     turned = f", turn_deg = {_list(turn)}" if np.abs(turn).max() > 0.0 else ""
     return f"{{ at_mm = {_list(1e3 * T[:3, 3])}{turned} }}"
 
 
 def _axis(axis: Array) -> str:
+    """Return an axis, (3,), as its letter if it is along x, y or z, otherwise as a list."""
     along = int(np.abs(axis).argmax())
     return f'"{"xyz"[along]}"' if abs(axis[along]) > 1.0 - 1e-12 else _list(axis)
 
 
 def _list(values: Iterable[float]) -> str:
-    """Without digits below a nanometre."""
+    """Return a TOML list of numbers, rounded to 1e-8 to hide rounding errors."""
     return "[" + ", ".join(f"{round(float(x), 8) + 0.0:.12g}" for x in values) + "]"

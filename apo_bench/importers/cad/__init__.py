@@ -1,1 +1,1 @@
-"""CAD files become parts: solids with fitted faces, then convex pieces; lengths in mm until a part is written."""
+"""Import CAD files as parts: fit the faces of each solid and cut the solid into convex pieces; lengths in mm."""

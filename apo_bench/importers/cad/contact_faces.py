@@ -1,4 +1,4 @@
-"""Regions become the faces of a part that can make contacts, [m]."""
+"""Convert named regions of a solid to the flat and round faces of a part, [m]."""
 
 import numpy as np
 import shapely
@@ -8,11 +8,11 @@ from apo_bench.importers.cad.faces.fitting import ON_WALL
 from apo_bench.importers.cad.solids import RawSolid, Region, find_square_axes
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
-_THINNEST_MM = 0.05
+_THINNEST_MM = 0.05  # largest radius of a round face that is too thin for contacts
 
 
 def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
-    """Return flat and round faces of the regions that have names; those that cannot be stated, with the reason."""
+    """Return the flat and the round faces of the named regions, and the regions that make none -> the reason."""
     flats: list[Face] = []
     rounds: list[RoundFace] = []
     refused: dict[str, str] = {}
@@ -33,9 +33,9 @@ def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str,
 
 
 def _flat_face(raw: RawSolid, region: Region) -> Face | None:
-    """A flat region with its holes; its ends of round walls are polygons inside of it, within 0.005 mm.
+    """Return a flat region as a face with its holes; None if it has more than one outline.
 
-    None if it has no single outline.
+    Borders that are ends of round walls become finer polygons inside the true circle, within 0.005 mm.
     """
     n = region.direction
     flat = np.array(find_square_axes(n))
@@ -51,16 +51,22 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
 
 
 def _circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
-    """A border, (k, 3); one that is the whole end of a round wall as a finer polygon than the mesh has, [mm]."""
+    """Return a border, (k, 3), [mm]; if it is the whole end of a round wall, as a finer polygon than the mesh has.
+
+    Args:
+        ring: The corners of the border, (k, 3), [mm].
+        hole: Whether the border is that of a hole in the region.
+    """
     near = ON_WALL * raw.mesh.extent
     wall = next((each for each in raw.regions if each.square and each.is_on_wall(ring, near).all()), None)
     if wall is None:
         return ring
-    # Where the axis meets the plane; corners between those of the wall's pieces, for a hole on a circle around it.
+    # Height of the end along the axis of the wall. Corners lie between those of the wall's pieces, and for a hole on
+    # a circumscribed circle.
     along = float(wall.direction @ region.direction)
     height = float((region.point - wall.point) @ region.direction / along)
     r = float(wall.radius_at(height))
-    n = max(count_sides(1e-3 * max(wall.radii)), COARSE_SIDES)
+    n = max(count_sides(1e-3 * max(wall.radii)), COARSE_SIDES)  # corners of the finer polygon
     # An outline is counter-clockwise seen against the normal of its face, a hole clockwise.
     turn = -1.0 if hole == (along > 0.0) else 1.0
     return wall.around(height, r / np.cos(np.pi / n) if hole else r, turn * 2.0 * np.pi * (np.arange(n) + 0.5) / n)

@@ -1,4 +1,4 @@
-"""The solids of a CAD file become part files: convex pieces, and faces that can make contacts."""
+"""Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
 
 import os
 from collections.abc import Container, Mapping
@@ -26,38 +26,40 @@ from apo_bench.scenario.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORN
 from apo_bench.scenario.parts.making import Body, build_solid, write_part
 from apo_bench.scenario.parts.making.moments import Moments
 
-_RAYS = 720
+_RAYS = 720  # around the axis, by which the free radius of a hole is measured
 _LEAST_SHARE = 0.5
-"""This share of a flat face must lie on pieces that stand for free shapes."""
+"""The share of a flat face that must lie on pieces, if some pieces are hulls of free-form shapes."""
 _NEARLY_ALL = 0.98
-"""This share of a flat face must lie on other pieces."""
+"""The share of a flat face that must lie on pieces otherwise."""
 _SLIVERS = 0.01
-"""Pieces may leave out this share of a solid as too thin; then the part has the volume of its pieces."""
+"""Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
+# Why a filled hole can make no contact.
 _FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ImportedPart:
-    """One part that was written."""
+    """A part that was imported and written."""
 
-    path: Path
+    path: Path  # the part file
     raw: RawSolid
-    solid: Solid
+    solid: Solid  # the part as read back from its file
     cut: Cut
     refused: Mapping[str, str]
-    """Faces that can make no contact, with the reason."""
+    """Faces that can make no contact -> the reason."""
     shares: Mapping[str, float]
-    """The stated share of a flat face, where the pieces do not hold all of it."""
+    """Flat face -> the share of its area that the pieces support; only faces below 1."""
     free_mm: Mapping[str, float]
-    """Free radius of each hole that is stated, as the pieces leave it."""
+    """Hole -> the largest radius free of pieces around its axis, [mm]."""
 
 
 def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
-    """Read the solids of a file, with named faces: as STEP states them, or fitted to triangles.
+    """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
 
     Args:
-        fewest_sides: Of a whole turn of a round face in a mesh; fewer sides are flat faces.
+        unit: Unit of a mesh file; None: as stated or guessed.
+        fewest_sides: Smallest number of facets of a round face around a full turn in a mesh.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
@@ -77,11 +79,12 @@ def import_solid(
     density: float = 1000.0,
     others: Array | None = None,
 ) -> ImportedPart:
-    """Write a raw solid as `NAME.xml` and `NAME.toml`, which make a part.
+    """Import one solid: write `NAME.xml` and `NAME.toml`, and read the part back.
 
     Args:
+        source: The name of the file, for messages and the part file.
         density: [kg/m^3].
-        others: Points of other solids that come near to it, (k, 3), [mm]: there its pieces are finest; None: unknown.
+        others: Points of other solids that come near, (k, 3), [mm], where pieces must be finest; None: unknown.
 
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
@@ -115,7 +118,7 @@ def import_solid(
             fault = error
             path.unlink()
             path.with_suffix(".toml").unlink(missing_ok=True)
-    else:
+    else:  # no moments gave a part that could be read
         why = str(fault).replace(f"{path.parent}{os.sep}", "").split("; ")[0].rstrip(".")
         raise InputError(f"{source}: its convex pieces make no part ({why}); leave out fillets.") from fault
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
@@ -123,15 +126,16 @@ def import_solid(
 
 
 def _check_faces(source: str, count: int) -> None:
+    """Raise InputError for a part without faces or with too many."""
     require(count, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is.")
     require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
 
 
 def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
-    """Return the moments of the solid, then those of its pieces if these leave out no more than slivers, [m].
+    """Return the moments to try: of the solid, then of its pieces if these omit no more than slivers, [m].
 
     Raises:
-        InputError: Pieces have too many corners, or those of flat faces do not fill the volume that the file has.
+        InputError: Pieces have too many corners, or the pieces of a solid with only flat faces do not fill its volume.
     """
     corners = sum(len(piece.corners) for piece in pieces.pieces)
     most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
@@ -151,17 +155,20 @@ def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
 
 
 def _without(body: Body, names: Container[str]) -> Body:
+    """Return the body without the named faces."""
     flats = tuple(face for face in body.flats if face.name not in names)
     rounds = tuple(face for face in body.rounds if face.name not in names)
     return replace(body, flats=flats, rounds=rounds)
 
 
 def _keep_held_faces(body: Body, least: float, refused: dict[str, str]) -> tuple[Body, dict[str, float]]:
-    """A body with the faces that its pieces hold; of flat ones the share that they hold, and that share.
+    """Return the body with the faces that its pieces support, and the shares of partly supported flat faces.
+
+    A flat face is trimmed to the supported share if that is large enough.
 
     Args:
-        least: The share of a flat face that must be held.
-        refused: Gets the other faces, with the reason.
+        least: Smallest share of a flat face that must be supported.
+        refused: Gets the omitted faces with the reason.
     """
     solid = build_solid("part", body)
     flats = {face.name: face for face in body.flats}
@@ -179,9 +186,9 @@ def _keep_held_faces(body: Body, least: float, refused: dict[str, str]) -> tuple
 
 
 def _fault(solid: Solid, face: Face | RoundFace) -> str:
-    """Why a face is not as the pieces are; empty if it is."""
+    """Return the reason why a face does not agree with the pieces; empty if it does."""
     if isinstance(face, Face):
-        across = np.argsort(np.abs(face.normal))[:2]
+        across = np.argsort(np.abs(face.normal))[:2]  # the two axes most nearly square to the normal
         if not Polygon(face.outline[:, across], [hole[:, across] for hole in face.holes]).is_valid:
             return "its outline crosses itself"
     flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
@@ -193,10 +200,10 @@ def _fault(solid: Solid, face: Face | RoundFace) -> str:
 
 
 def _free_radius(solid: Solid, wall: RoundFace) -> float:
-    """How far the pieces are from the axis of a hole, where it is narrowest, [m]."""
+    """Return the distance of the pieces from the axis of a hole, at its narrow end, [m]."""
     angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
     out = np.outer(np.cos(angle), wall.frame[:3, 0]) + np.outer(np.sin(angle), wall.frame[:3, 1])
-    share = 0.5
+    share = 0.5  # height of the measurement, as a share of the length
     if wall.kind == "cone":
         share = 0.02 if wall.radii[0] < wall.radii[1] else 0.98
     at = wall.point + (wall.span[0] + share * wall.length) * wall.axis

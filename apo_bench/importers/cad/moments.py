@@ -1,4 +1,4 @@
-"""Volume, centroid and inertia of solids: of their meshes, with round walls as they were fitted."""
+"""Compute volume, centroid and inertia of solids from their meshes, with round walls at their fitted radii."""
 
 from collections.abc import Iterable
 
@@ -13,27 +13,28 @@ from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
 
 
 def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
-    """[m]: of the mesh and what lies between its sides and walls that pieces are rebuilt for.
+    """Return the moments of a solid, [m]: its mesh, plus the slivers between the facets and the fitted round walls.
 
-    Of the pieces where these stand for free shapes, or fill holes.
+    If pieces are hulls of free-form shapes or fill holes, return the moments of the pieces.
     """
     if cut.hulls or cut.filled:
         return moments_of_pieces(cut.pieces)
     moments = _mesh_moments(raw.mesh)
     for region in raw.regions:
         if region.square:
+            # Removes material at a hole.
             moments = moments.plus(_behind_sides(raw.mesh, region), -1.0 if region.hole else 1.0)
     return moments.in_metres
 
 
 def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
-    """[m]: of what the pieces fill."""
+    """Return the moments of the union of the pieces, [m]."""
     hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
     return _mesh_moments(convert_to_mesh(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
 
 
 def _mesh_moments(mesh: Mesh) -> Moments:
-    """Of a closed mesh, [mm]."""
+    """Return the moments of a closed mesh, [mm]."""
     found = trimesh.Trimesh(mesh.corners, mesh.triangles, process=False).mass_properties
     # The integral of x x^T about the centroid is trace(J) / 2 - J, J being the inertia.
     second = np.trace(found.inertia) / 2.0 * np.eye(3) - found.inertia
@@ -41,7 +42,7 @@ def _mesh_moments(mesh: Mesh) -> Moments:
 
 
 def _behind_sides(mesh: Mesh, wall: Region) -> Moments:
-    """Between a round wall and its sides, [mm]."""
+    """Return the moments of the space between a round wall and its facets, [mm]."""
     corners = mesh.corners[np.unique(mesh.triangles[wall.triangles])]
     within = _mesh_moments(convert_to_mesh(manifold3d.Manifold.hull_points(corners)))
     true = frustum_moments(*wall.span, *wall.radii).moved(np.column_stack([*wall.across, wall.direction]), wall.point)

@@ -1,4 +1,4 @@
-"""A picture of a part with the names of its faces, from two sides."""
+"""Draw a part with the names of its faces, from two directions."""
 
 from collections.abc import Container
 from pathlib import Path
@@ -12,12 +12,16 @@ from apo_bench.io import save_figure, use_figure_style
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
-_FLAT, _ROUND, _REFUSED, _NAMELESS = "#8fb3d9", "#e0b070", "#d98f8f", "#cfcfcf"
+_FLAT, _ROUND, _REFUSED, _NAMELESS = "#8fb3d9", "#e0b070", "#d98f8f", "#cfcfcf"  # colors of faces by kind
 
 
 @use_figure_style()
 def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) -> None:
-    """Write it as PNG: flat faces blue, round ones orange, red what can make no contact though it has a name."""
+    """Write a PNG: flat faces blue, round faces orange, named faces that can make no contact red.
+
+    Args:
+        refused: Names of the faces that can make no contact.
+    """
     from matplotlib.figure import Figure
 
     colors = np.full(len(raw.mesh.triangles), _NAMELESS)
@@ -32,11 +36,16 @@ def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) ->
 
 
 def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
-    """Draw the triangles that face the viewer, and the name of each face on its largest triangle."""
+    """Draw the triangles that face the viewer, and the name of each face at its most visible triangle.
+
+    Args:
+        colors: Color of each triangle, (t,).
+        elevation, azimuth: Direction of the viewer, [deg].
+    """
     mesh = raw.mesh
     e, a = np.radians([elevation, azimuth])
     viewer = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    height = mesh.across @ viewer
+    height = mesh.across @ viewer  # twice the visible area of each triangle; positive if it faces the viewer
     points = mesh.corners[mesh.triangles]
     for color in np.unique(colors[height > 0.0]).tolist():
         triangles = mesh.triangles[(colors == color) & (height > 0.0)]

@@ -1,4 +1,4 @@
-"""What an import of a CAD file did, as plain data in mm, and as lines for a person."""
+"""Report the import of a CAD file as plain data in mm, and as lines for the terminal."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,7 +13,11 @@ from apo_bench.importers.cad.solids import Region, clean_title
 
 
 def report_file(file: CadFile, path: Path, parts: Sequence[ImportedPart], poses: Path | None) -> dict[str, Any]:
-    """Return the report of a file as plain data."""
+    """Return the report of a file as plain data, for JSON.
+
+    Args:
+        poses: The file of poses, if one was written.
+    """
     return {
         "file": str(path),
         "unit": file.unit,
@@ -44,6 +48,7 @@ def report_part(part: ImportedPart) -> dict[str, Any]:
 
 
 def _report_face(part: ImportedPart, name: str, region: Region) -> dict[str, Any]:
+    """Return the report of one face as plain data, [mm]."""
     report: dict[str, Any] = {
         "kind": region.kind,
         "no_contact": part.refused.get(name),
@@ -62,13 +67,13 @@ def _report_face(part: ImportedPart, name: str, region: Region) -> dict[str, Any
 
 
 def file_lines(file: CadFile, path: Path) -> Iterator[str]:
-    """Return `part.stl: unit mm, taken from the size; the file states none`, and the warnings."""
+    """Yield `part.stl: unit mm, taken from the size; the file states none`, and the warnings."""
     yield f"{path}: unit {file.unit}, {file.unit_from}"
     yield from (f"{path}: {warning}" for warning in file.warnings)
 
 
 def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
-    """Return the report of one part in lines."""
+    """Yield the report of one part as lines."""
     yield f"{report['part']}: {_numbers(report['size_mm'], ' x ')} mm, {report['triangles']:,} triangles"
     if report["title"] != report["part"]:
         yield f"  title: {report['title']}"
@@ -84,6 +89,7 @@ def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _face_text(face: Mapping[str, Any]) -> str:
+    """Return the line of one face, from its report."""
     if face["kind"] == "plane":
         text = f"flat, normal ({_numbers(face['normal'])}), {face['offset_mm']:.6g} mm from the origin"
     else:
@@ -100,4 +106,5 @@ def _face_text(face: Mapping[str, Any]) -> str:
 
 
 def _numbers(values: Iterable[float], between: str = ", ") -> str:
+    """Return numbers without rounding noise, as text."""
     return between.join(f"{round(float(x), 4) + 0.0:g}" for x in values)

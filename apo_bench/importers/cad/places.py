@@ -1,4 +1,4 @@
-"""Write the file of poses with the places of the parts of a CAD file."""
+"""Write the poses of all copies of parts in a CAD file to a file of poses."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -12,10 +12,10 @@ from apo_bench.io import write_file
 
 
 def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
-    """Part, name and place of each copy: as the file calls it, with a number where that is taken.
+    """Return part, unique name and place of each copy.
 
     Args:
-        parts: Places of each part file.
+        parts: Part -> its places.
     """
     used: set[str] = set()
     copies = []
@@ -28,9 +28,14 @@ def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, s
 
 
 def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, source: str) -> Path:
-    """Write `poses.toml`, which `scenario new` reads with the part files."""
+    """Write `poses.toml`, which `scenario new` reads together with the part files, and return its path.
+
+    Args:
+        places: Part, name and place of each copy.
+        source: Names of the CAD files, for the header.
+    """
     lines = [f"# where {source} has its parts".replace("\n", " ")]
-    for part, name, place in places:
+    for part, name, place in places:  # [mm], as CAD files are imported
         packed = pose.pack(place.T)
         lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
         lines += [f"title = {json.dumps(clean_title(place.name), ensure_ascii=False)}"] * (name != place.name)
@@ -44,4 +49,5 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
 
 
 def _list(values: Iterable[float]) -> str:
+    """Return a TOML list of numbers without rounding noise."""
     return "[" + ", ".join(f"{round(float(x), 12) + 0.0:.12g}" for x in values) + "]"

@@ -1,1 +1,1 @@
-"""A tracker's log becomes an observation: formats, frames, rests, operations."""
+"""Import the pose log of a tracker as an observation: read it, find rests of parts, and match them to operations."""

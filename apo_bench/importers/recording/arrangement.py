@@ -1,4 +1,4 @@
-"""The camera, the starts and the order of operations that the rests of a log give, and how well they fit."""
+"""Arrange a log: find the camera pose, the starts of parts and the order of operations, and how well they fit."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -13,49 +13,51 @@ from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
 from apo_bench.importers.recording.ordering import Order, Stated, end_of_operation, find_order, stated_order
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
-_HIGH_M = 0.01
-_TILTED_DEG = 10.0
-"""A part observed higher or more tilted than planned by this stands otherwise."""
+_HIGH_M = 0.01  # largest difference of height between the start of a part and its plan
+_TILTED_DEG = 10.0  # largest difference of tilt
+"""Beyond these limits, a part starts otherwise than planned: `otherwise` in `Arrangement.start_source`."""
 
 
 class Arrangement(NamedTuple):
-    """A camera and an order, and how well they fit."""
+    """The camera pose, the starts and the order of operations that a log gives, and how well they fit."""
 
     camera: CameraPose
     order: Order
     start: Poses
-    """Of all parts, world, [m]."""
+    """Start of every part, world, [m]."""
     start_source: Mapping[str, str]
-    """Part -> where its start is from: `known`, `seen`, `scenario`, `otherwise`, `in the hand` (as in the scenario)."""
+    """Part -> source of its start: `known`, `seen`, `scenario`, `otherwise`, `in the hand` (as in the scenario)."""
     fits: Mapping[int, ContactFit]
-    """Operation that was observed, counted from 0 -> its worst contact."""
+    """Observed operation, counted from 0 -> the misfit of its worst contact."""
     intervals: RestIntervals
-    """From where each part stood at the start."""
+    """Rest intervals of each part from its start on, without pauses of a hand before it."""
 
     @property
     def fit(self) -> ContactFit:
-        """The worst contact of all."""
+        """The worst misfit over all contacts."""
         return max(self.fits.values(), key=lambda fit: fit.wrong_mm, default=ContactFit(0.0, 0.0))
 
     @property
     def wrong_mm(self) -> float:
+        """The worst misfit of contacts and known places, [mm]; a degree counts like a millimetre."""
         return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
 
 
 Arrange = Callable[[RestIntervals], Arrangement]
-"""Arranges a log under the same statements."""
+"""Function that arranges rest intervals with the same camera file, scenario and statements."""
 
 
 def arrange(
     intervals: RestIntervals, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
 ) -> Arrangement:
-    """Find the camera and the order that rest intervals give.
+    """Find the camera pose and the order of operations for rest intervals.
 
     Args:
-        planned: Where the scenario starts every part, world, [m].
+        planned: Start of every part in the scenario, world, [m].
+        stated: Ends of operations and unobserved operations, as the user states them.
 
     Raises:
-        NoMatchingOrder: The moves are not the operations.
+        NoMatchingOrder: The motions in the log do not match the operations.
         InputError: The camera file states no pose of the camera.
     """
     solved = find_camera(intervals, camera, planned, assembly.fixed)
@@ -66,6 +68,7 @@ def arrange(
     in_hand = {part: "in the hand" for part in standing if part not in begun and source[part] == "scenario"}
     intervals = {part: standing[part] or known for part, known in intervals.items()}
     if stated.ends:
+        # Parts that a hand held all the time take their start from the scenario.
         order = stated_order(assembly, intervals, stated.ends)
     else:
         order = find_order(assembly, intervals, start, X, stated.unseen)
@@ -81,20 +84,21 @@ def arrange(
 def _since_standing(
     known: Sequence[RestInterval], assembly: Assembly, planned: Array, X: Array
 ) -> tuple[RestInterval, ...]:
-    """The intervals of a part from its start on; none if a hand held it in the air until its last place.
+    """Return the rest intervals of a part from its start on; none if a hand held it in the air until its last place.
 
-    A first interval in the air is a pause of the hand, which then put the part down, as long as one interval follows
+    A first interval in the air is a pause of the hand. Such intervals are dropped while at least one interval remains
     for each operation that moves the part.
 
     Args:
-        planned: Where the scenario starts it, world, [m].
-        X: The camera.
+        known: The intervals of the part, in order of time.
+        planned: Start of the part in the scenario, world, [m].
+        X: (4, 4), pose of the camera in the world.
     """
     part = known[0].part
     pieces = assembly.solids[part].pieces
     lowest = planned[2, 3] + measure_extent(pieces, planned[2, :3])[0]
     moves = sum(operation.main == part for operation in assembly.operations)
-    for i in range(max(1, len(known) - moves)):
+    for i in range(max(1, len(known) - moves)):  # keeps the first interval and one for each operation, at least
         T = X @ known[i].rests[0].T
         if part in assembly.fixed or T[2, 3] + measure_extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
             return tuple(known[i:])
@@ -102,11 +106,11 @@ def _since_standing(
 
 
 def find_starts(observed: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses, Mapping[str, str]]:
-    """Return where every part starts, and from where that is known; see `Arrangement.start_source`.
+    """Return the start of every part, world, and its source as in `Arrangement.start_source`.
 
     Args:
-        observed: Of tracked parts, world, [m].
-        planned: Of all parts.
+        observed: First rest of tracked parts, world, [m].
+        planned: Start of all parts in the scenario, world, [m].
     """
     start = dict(planned)
     source = dict.fromkeys(planned, "scenario")
@@ -115,16 +119,16 @@ def find_starts(observed: Poses, camera: CameraFile, planned: Poses) -> tuple[Po
         start[part] = T if level is None else level
         source[part] = "otherwise" if level is None else "seen"
     known = camera.places(planned)
-    return {**start, **known}, {**source, **dict.fromkeys(known, "known")}
+    return {**start, **known}, {**source, **dict.fromkeys(known, "known")}  # places of the camera file take precedence
 
 
 def _level(planned: Array, observed: Array) -> Array | None:
-    """Place and turn on the table as observed, height and tilt as planned, (4, 4); None if the part stood otherwise."""
-    # Of all turns about z the one nearest to R maximises trace(Rz^t R), which is at this angle.
+    """Return the planned pose moved to the observed x, y and yaw, (4, 4); None if the height or the tilt differs."""
+    # The rotation Rz about z nearest to R maximises trace(Rz^t R), which gives this angle.
     R = observed[:3, :3] @ planned[:3, :3].T
     turn = float(np.degrees(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
     T = np.array(pose.at((0.0, 0.0, 0.0), (0.0, 0.0, turn)) @ planned)
     T[:3, 3] = (*observed[:2, 3], planned[2, 3])
-    off = pose.log(pose.inverse(T) @ observed)
+    off = pose.log(pose.inverse(T) @ observed)  # body twist from the moved plan to the observed pose
     is_high = abs(observed[2, 3] - planned[2, 3]) > _HIGH_M
     return None if is_high or np.degrees(np.linalg.norm(off[3:])) > _TILTED_DEG else T

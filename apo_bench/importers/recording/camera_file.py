@@ -1,4 +1,4 @@
-"""CAMERA.toml: how a log is written, and the places of its camera and of known parts."""
+"""Read CAMERA.toml: the conventions of a log, the pose of its camera, and the places of known parts."""
 
 import re
 from collections.abc import Mapping
@@ -14,47 +14,47 @@ from apo_bench.geometry import Array
 from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
 
-_EULER = re.compile(r"(?!.*(.)\1)([xyz]{3}|[XYZ]{3})")
+_EULER = re.compile(r"(?!.*(.)\1)([xyz]{3}|[XYZ]{3})")  # each axis once, all small or all capital letters
 NamedEntries = Annotated[dict[str, Any], Meta(min_length=1)]
-"""A table whose keys are names of the reader's own."""
+"""A table whose keys are names that the user chooses."""
 
 
 class Conventions(FileTable, frozen=True, kw_only=True):
-    """How a log is written, where its columns do not show it."""
+    """Conventions of a log that its columns do not show."""
 
     length: Literal["mm", "cm", "m"] | None = None
     angle: Literal["deg", "rad"] | None = None
     time: Literal["s", "ms", "us", "ns"] = "s"
     quaternion: Literal["wxyz", "xyzw"] | None = None
-    """Order of four numbers without names."""
+    """Order of the four numbers of a quaternion without names, q0 to q3."""
     euler: str | None = None
-    """Axes as SciPy spells them: `xyz` about fixed axes, `XYZ` about moving ones."""
+    """Order of Euler angles as in SciPy: `xyz` about fixed axes, `XYZ` about moving axes."""
     rate_hz: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
-    """Of images that have no time."""
+    """Rate of images, for logs without times."""
     scene: int | None = None
-    """Of BOP results, which may hold several."""
+    """Scene of BOP results, which may hold several."""
     inverted: bool = False
-    """Whether poses are of the camera in the model."""
+    """Whether poses are those of the camera in the frame of the model."""
     mirror: Literal["x", "y", "z"] | None = None
-    """The axis along which a left-handed tracker counts the other way."""
+    """The reversed axis of a left-handed tracker."""
     columns: dict[str, str] = field(default_factory=dict)
-    """What it is here -> column of the file."""
+    """Name of a column as this package knows it -> its name in the file."""
 
 
 class RestNoiseTable(FileTable, frozen=True, kw_only=True):
-    """An error that stays while a part rests."""
+    """The table [noise]: standard deviations of an error that is constant while a part rests."""
 
     stays_mm: Annotated[float, Meta(ge=0.0, le=100.0)]
     stays_deg: Annotated[float, Meta(ge=0.0, le=90.0)]
 
     @property
     def deviation(self) -> Array:
-        """(2,), [m, rad]."""
+        """(2,), standard deviations along and about each axis, [m, rad]."""
         return np.array([self.stays_mm * 1e-3, np.radians(self.stays_deg)])
 
 
 class CameraTable(FileTable, frozen=True, kw_only=True):
-    """The tables of the file."""
+    """The tables of a camera file."""
 
     schema: Literal["apo-bench/camera/1"]
     log: Conventions = Conventions()
@@ -66,21 +66,21 @@ class CameraTable(FileTable, frozen=True, kw_only=True):
 @final
 @dataclass(frozen=True, eq=False)
 class CameraFile:
-    """The statements of a camera file."""
+    """The content of a camera file."""
 
     conventions: Conventions
     T_world_camera: Array | None
-    """(4, 4), [m]; None: to be solved."""
+    """(4, 4), [m]; None: to be solved from known parts."""
     known: Mapping[str, Array | None]
-    """Part -> where it stands in the world, (4, 4); None: where the scenario starts it."""
+    """Part -> its pose in the world, (4, 4), [m]; None: its start in the scenario."""
     stays: Array | None
-    """(2,), standard deviation of the error that stays while a part rests, per axis, [m, rad]; None: not stated."""
+    """(2,), standard deviations of the error that is constant during a rest, along and about each axis, [m, rad]."""
 
     def places(self, planned: Mapping[str, Array]) -> Mapping[str, Array]:
-        """Return where known parts stand in the world, (4, 4), [m].
+        """Return the poses of known parts in the world, (4, 4), [m].
 
         Args:
-            planned: Where the scenario starts them.
+            planned: Start of each part in the scenario, for parts that are known to be there.
         """
         return {part: planned[part] if T is None else T for part, T in self.known.items()}
 
@@ -106,6 +106,7 @@ def read_camera(path: str | Path) -> CameraFile:
 
 
 def _place(value: Any, place: str) -> Array | None:
+    """Read a known place; None for "start"."""
     if value == "start":
         return None
     require(isinstance(value, dict), f'{place}: "start" or a pose is needed.')

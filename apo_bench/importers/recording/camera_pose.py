@@ -1,4 +1,4 @@
-"""The pose of the camera: as stated, or solved from the first rests of parts on known places."""
+"""Find the pose of the camera: as stated, or solved from the first rests of parts at known places."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -14,42 +14,42 @@ from apo_bench.importers.recording.averaging import Mean
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
-_ROUNDS = 50
+_ROUNDS = 50  # largest number of Gauss-Newton iterations
 _PLACE_DEVIATION = copy_frozen(np.repeat([2e-4, 2e-3], 3), 6)
-"""Standard deviation of a known place, per axis, [m, rad]."""
+"""Standard deviation of a known place along and about each axis, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CameraPose:
-    """The pose of a camera, and how it is known."""
+    """The pose of a camera in the world, and its uncertainty."""
 
     T_world_camera: Array
     """(4, 4), [m]."""
     residuals: Mapping[str, Array] = field(default_factory=dict)
-    """Part -> (6,), the body twist from its known place to the observed one; empty of a stated pose."""
+    """Part -> body twist from its known place to the observed pose, (6,), [m, rad]; empty for a stated camera pose."""
     covariance: Array | None = None
-    """(6, 6), of the body twist by which the pose is wrong, [m, rad]; None of a stated pose."""
+    """(6, 6), covariance of the body twist of the error, [m, rad]; None for a stated camera pose."""
 
     @property
     def off_mm(self) -> float:
-        """The largest distance of a part from its known place, [mm]."""
+        """The largest distance between a part and its known place, [mm]."""
         return max((1e3 * float(np.linalg.norm(r[:3])) for r in self.residuals.values()), default=0.0)
 
     @property
     def off_deg(self) -> float:
-        """The largest turn of a part from its known place."""
+        """The largest angle between a part and its known place, [deg]."""
         return max((float(np.degrees(np.linalg.norm(r[3:]))) for r in self.residuals.values()), default=0.0)
 
 
 def find_camera(
     intervals: RestIntervals, camera: CameraFile, planned: Poses, fixed: Collection[str] = ()
 ) -> CameraPose:
-    """Return the camera as stated, or solve it from the first rests of parts on known places.
+    """Return the camera pose as stated, or solve it from the first rests of parts at known places.
 
     Args:
-        planned: Where a scenario starts the parts, world, [m].
-        fixed: Parts that never move: their places may be known though they are not tracked.
+        planned: Start of the parts in the scenario, world, [m].
+        fixed: Parts that never move; they may have a known place though they are not tracked.
 
     Raises:
         InputError: Neither is stated, or a known part that may move is not tracked.
@@ -69,28 +69,31 @@ def find_camera(
 
 
 def rest_error(camera: CameraFile, mean: Mean) -> Array:
-    """Return the covariance of the error that stays while a part rests, (6, 6); that of one frame if not stated."""
+    """Return the covariance of the error that is constant while a part rests, (6, 6), [m, rad].
+
+    It is that of the camera file, or if none is stated, the covariance of one frame.
+    """
     return mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2)
 
 
 def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], constant: Array) -> CameraPose:
-    """Solve the pose at which the parts stand on their places, by weighted least squares on SE(3).
+    """Solve for the camera pose X that puts observed parts at their known places: weighted least squares on SE(3).
 
     X exp(d) M = K exp(r): residuals r of parts observed at M and standing at K change by Ad(M^-1) d.
 
     Args:
-        known: Part -> (4, 4), where it stands in the world, [m].
-        observed: Part -> its mean pose, camera from part.
-        constant: (6, 6), covariance of the error that stays while a part rests, [m, rad].
+        known: Part -> its pose in the world, K, (4, 4), [m].
+        observed: Part -> its mean pose in the camera, M.
+        constant: (6, 6), covariance of the error that is constant while a part rests, [m, rad].
     """
     parts = tuple(known)
     K = np.array([known[p] for p in parts])
     M = np.array([observed[p].T for p in parts])
     W = np.array([np.linalg.inv(observed[p].covariance + constant + np.diag(_PLACE_DEVIATION**2)) for p in parts])
-    # Normal equations of r + A d = 0, the sum of A^t W A over parts; A hardly depends on X.
+    # Normal equations of r + A d = 0, the sum of A^t W A over parts; A hardly depends on X, so it is computed once.
     A = pose.adjoint(pose.inverse(M))
     normal = np.einsum("kji,kjl,klm->im", A, W, A)
-    # Each part alone gives X = K M^-1; Gauss-Newton begins at the one that fits all parts best.
+    # Each part alone gives X = K M^-1; start from the one with the least total cost.
     X = min(K @ pose.inverse(M), key=lambda X: _cost(_residuals(X, K, M), W))
     for _ in range(_ROUNDS):
         r = _residuals(X, K, M)
@@ -99,14 +102,22 @@ def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], const
         if np.abs(step).max() < 1e-12:
             break
     r = _residuals(X, K, M)
-    # Chi-square over its degrees of freedom is the factor by which stated variances were too small.
+    # Chi-square over its degrees of freedom estimates by how much the stated variances are too small.
     excess = max(1.0, _cost(r, W) / max(6 * len(parts) - 6, 1)) if len(parts) > 1 else 1.0
     return CameraPose(X, MappingProxyType(dict(zip(parts, r, strict=True))), excess * np.linalg.inv(normal))
 
 
 def _residuals(X: Array, K: Array, M: Array) -> Array:
+    """Return the body twists from known to observed poses, (k, 6).
+
+    Args:
+        X: (4, 4), world from camera.
+        K: (k, 4, 4), known poses in the world.
+        M: (k, 4, 4), observed poses in the camera.
+    """
     return pose.log(pose.inverse(K) @ X @ M)
 
 
 def _cost(r: Array, W: Array) -> float:
+    """Return the sum of squared residuals, weighted by W, (k, 6, 6)."""
     return float(np.einsum("ki,kij,kj->", r, W, r))

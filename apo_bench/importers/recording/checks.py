@@ -1,4 +1,4 @@
-"""Refuse a recording that contradicts its scenario: open contacts, or parts that moved without an operation."""
+"""Reject a recording that contradicts its scenario: open contacts, or parts that moved without an operation."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -17,20 +17,23 @@ from apo_bench.importers.recording.ordering import NoMatchingOrder, describe_mov
 from apo_bench.importers.recording.rest_intervals import RestIntervals, is_near
 
 _FITS_MM = 20.0
-"""A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
+"""A larger misfit of a contact or of a known place cannot be noise; a degree counts like a millimetre."""
 _BETTER = 0.4
-"""Another convention fits better if it leaves less than this share of the misfit."""
+"""Another convention is suggested only if it leaves less than this share of the misfit."""
 _FAR = 5.0
-"""A part that moved by more standard deviations did move."""
+"""A part moved if its displacement exceeds this many standard deviations."""
 
 
 def check_arrangement(
     arrangement: Arrangement, arrange: Arrange, intervals: RestIntervals, models: Mapping[str, Array], file: str
 ) -> None:
-    """Refuse a recording in which contacts are open, and name another convention if that fits better.
+    """Raise InputError if contacts are far open, and name another convention of the log if that fits better.
 
     Args:
-        models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; the identity if it is missing.
+        arrange: Function that arranges rest intervals again, for other conventions.
+        intervals: The rest intervals as read.
+        file: Name of the log, for messages.
+        models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; the identity if missing.
     """
     if arrangement.wrong_mm <= _FITS_MM:
         return
@@ -53,7 +56,7 @@ def check_arrangement(
 
 
 def _other_conventions() -> Sequence[tuple[str, Callable[[Array], Array]]]:
-    """The keys of the camera file whose value may be another, and how the poses of models change with each."""
+    """Return the conventions to try: key of the camera file, and the change of model poses for another value of it."""
     return (
         *(("quaternion", partial(_reorder, shift=shift)) for shift in (1, -1)),
         *(("mirror", partial(np.multiply, mirror(axis))) for axis in "xyz"),
@@ -62,7 +65,7 @@ def _other_conventions() -> Sequence[tuple[str, Callable[[Array], Array]]]:
 
 
 def _reorder(T: Array, shift: int) -> Array:
-    """The rotation of the same four numbers in the other order."""
+    """Return the pose with the numbers of its quaternion shifted cyclically, as if read in the other order."""
     packed = pose.pack(T)
     return np.asarray(pose.unpack(np.concatenate([packed[:3], np.roll(packed[3:], shift)])))
 
@@ -70,7 +73,7 @@ def _reorder(T: Array, shift: int) -> Array:
 def _change_models(
     intervals: RestIntervals, models: Mapping[str, Array], change: Callable[[Array], Array]
 ) -> RestIntervals:
-    """The intervals of the same parts with changed poses of their models."""
+    """Return the intervals with the poses of models changed; poses of parts are converted to models and back."""
     changed = {}
     for part, known in intervals.items():
         M = models.get(part, np.eye(4))
@@ -89,12 +92,17 @@ def check_moved(
     assembly: Assembly,
     file: str,
 ) -> None:
-    """Refuse a recording in which a part moved without an operation, by more than errors or an adjustment explain."""
+    """Raise InputError if a part moved without an operation, by more than errors or an adjustment explain.
+
+    Args:
+        operations: The observed operations, in order.
+        file: Name of the log, for messages.
+    """
     unseen = {part for k, each in enumerate(operations) if each.rest is None for part in assembly.operations[k].moves}
     for k, operation in enumerate(operations):
         for part, twist in {**operation.carried, **operation.adjusted}.items():
             means = [rest.mean for interval in intervals[part] for rest in interval.rests]
-            # Of the difference of two rests, each as uncertain as the least certain one.
+            # Variance of the difference of two rests, each as uncertain as the least certain one.
             variance = np.max([np.diag(mean.covariance + rest_error(camera, mean)) for mean in means], axis=0)
             deviations = float(np.abs(twist / np.sqrt(2.0 * variance)).max())
             if part in unseen or is_near(twist) or deviations <= _FAR:

@@ -1,4 +1,4 @@
-"""How far the contacts of an operation are open at given poses."""
+"""Measure how far the contacts of an operation are open at given poses."""
 
 from typing import NamedTuple
 
@@ -9,16 +9,16 @@ from apo_bench.geometry import RoundFace, measure_face_area, measure_lateral_gap
 
 
 class ContactFit(NamedTuple):
-    """The worst of some contacts."""
+    """The misfit of contacts; of several contacts the largest gap and the largest angle."""
 
     gap_m: float
-    """Distance of the middle of the smaller face from the other face, or of two axes."""
+    """Distance of the centre of the smaller face from the other face; for round faces as in `measure_round`."""
     angle_rad: float
-    """Between the normal of one and the opposite of the other, or between axes."""
+    """Angle between one normal and the opposite of the other; for round faces between axes."""
 
     @property
     def wrong_mm(self) -> float:
-        """A degree counts like a millimetre."""
+        """Gap plus angle, [mm]; a degree counts like a millimetre."""
         return 1e3 * self.gap_m + float(np.degrees(self.angle_rad))
 
 
@@ -29,11 +29,12 @@ def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
 
 
 def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
+    """Measure the misfit of one contact."""
     (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
         measured = measure_round(a, T_a, b, T_b)
         return ContactFit(abs(measured.gap_m), measured.angle_rad)
-    # From the middle of the smaller face: how high above the plane of the larger one, how far outside its outline.
+    # From the centre of the smaller face: height above the plane of the larger one, and distance outside its outline.
     if measure_face_area(a) > measure_face_area(b):
         (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
     cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))

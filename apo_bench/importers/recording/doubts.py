@@ -1,4 +1,4 @@
-"""List what stays unclear of a recording that fits, one sentence for each doubt."""
+"""List what remains doubtful in a recording that fits its scenario, one sentence each."""
 
 from collections.abc import Iterator
 
@@ -10,9 +10,9 @@ from apo_bench.importers.recording.arrangement import Arrangement
 from apo_bench.importers.recording.averaging import per_axis
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
-_OPEN_MM = 3.0
-_OPEN_DEVIATIONS = 5.0
-"""A contact is open by more than both; a degree counts like a millimetre."""
+_OPEN_MM = 3.0  # smallest gap of a doubtful contact
+_OPEN_DEVIATIONS = 5.0  # standard deviations of the pose, added to the gap above
+"""A contact is doubtful if it is open by more than the sum of both; a degree counts like a millimetre."""
 
 
 def list_doubts(
@@ -21,7 +21,7 @@ def list_doubts(
     """Return one sentence for each doubt.
 
     Args:
-        covariance: Of each observed pose, (n, 6, 6), [m, rad].
+        covariance: Covariance of each observed pose, (n, 6, 6), [m, rad].
     """
     return (
         *_rivals(arrangement),
@@ -32,6 +32,7 @@ def list_doubts(
 
 
 def _rivals(arrangement: Arrangement) -> Iterator[str]:
+    """Yield a sentence for each operation that may as well have ended at another time."""
     chosen, rival = arrangement.order
     for k, (mine, other) in enumerate(zip(chosen, rival or chosen, strict=True)):
         if mine is not None and other is not None and mine is not other:
@@ -42,6 +43,7 @@ def _rivals(arrangement: Arrangement) -> Iterator[str]:
 
 
 def _open_contacts(arrangement: Arrangement, covariance: Array, assembly: Assembly) -> Iterator[str]:
+    """Yield a sentence for each operation that leaves a contact further open than its noise explains."""
     for k, fit in arrangement.fits.items():
         mm, deg = np.multiply(per_axis(covariance[k]), (1e3, np.degrees(1.0)))
         if fit.wrong_mm > _OPEN_MM + _OPEN_DEVIATIONS * (mm + deg):
@@ -53,6 +55,7 @@ def _open_contacts(arrangement: Arrangement, covariance: Array, assembly: Assemb
 
 
 def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
+    """Yield a sentence for each part that is not carried and rested at times that no operation ended."""
     carried = {part for operation in assembly.operations for part in operation.carries}
     for part, known in intervals.items():
         pauses = [f"{each.begins:.2f} s" for each in known[1:] if each not in arrangement.order.intervals]
@@ -62,6 +65,7 @@ def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assemb
 
 
 def _hidden(intervals: RestIntervals) -> Iterator[str]:
+    """Yield a sentence for each rest after which the tracker lost the part."""
     for part, known in intervals.items():
         for rest in (rest for interval in known for rest in interval.rests if rest.gone > rest.ends):
             yield f"'{part}' was hidden from {rest.ends:.2f} to {rest.gone:.2f} s"

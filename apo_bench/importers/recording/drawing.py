@@ -1,4 +1,4 @@
-"""A picture of a recording: the paths of parts around the camera, and when each part rests."""
+"""Draw a recording: the paths of parts around the camera, and the times at which each part rests."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from apo_bench.importers.recording.rest_intervals import find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.io import save_figure, use_figure_style
 
-_AXIS_COLORS = ("#c0392b", "#2e8b57", "#2456a6")
+_AXIS_COLORS = ("#c0392b", "#2e8b57", "#2456a6")  # x, y and z
 
 
 @use_figure_style()
@@ -25,9 +25,9 @@ def draw_recording(
     """Write the picture as PNG.
 
     Args:
-        tracks: Of parts, camera from part.
+        tracks: Track of each part, camera from part.
         T_world_camera: (4, 4), [m]; None: the picture is in the frame of the camera.
-        operations: Part of each operation, and when it came to rest, [s].
+        operations: Main part of each operation, and the time at which it came to rest, [s].
     """
     from matplotlib.figure import Figure
 
@@ -60,6 +60,7 @@ def draw_recording(
 
 
 def _draw_frame(axes: Any, T: Array, size: float, name: str) -> None:
+    """Draw the axes of a frame with a length, [m], and its name."""
     for i, color in enumerate(_AXIS_COLORS):
         axes.plot(*np.column_stack([T[:3, 3], T[:3, 3] + size * T[:3, i]]), color=color, linewidth=1.6)
     axes.text(*T[:3, 3], f" {name}")

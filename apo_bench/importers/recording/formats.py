@@ -1,4 +1,4 @@
-"""The formats of logs: name -> how a file is read."""
+"""Read logs of every supported format into tracks."""
 
 from collections.abc import Callable, Mapping
 from itertools import chain
@@ -24,11 +24,11 @@ FORMATS: Mapping[str, Callable[[Path], LogTable] | None] = MappingProxyType(
         "bop": None,
     }
 )
-"""Name -> its reader; BOP results are numbers already."""
+"""Name of a format -> its reader; None for BOP results, which hold numbers and not cells of text."""
 
 
 def read_log(path: str | Path, form: str, how: Conventions) -> Log:
-    """Read a log, or a folder of logs of one object each, in one of `FORMATS`.
+    """Read a log, or a folder with one log per object, in one of `FORMATS`.
 
     Returns:
         Tracks in metres and right-handed axes, camera from model.
@@ -49,7 +49,7 @@ def read_log(path: str | Path, form: str, how: Conventions) -> Log:
 
 
 def _read_bop(path: Path, how: Conventions) -> LogRows:
-    """Read BOP results: [mm], rotation matrices, images by number; the best score of an object in an image counts."""
+    """Read one scene of BOP results, in mm; of several estimates of an object in an image the best score counts."""
     results = read_results(path)
     scenes = np.unique(results.where[:, 0])
     scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
@@ -59,7 +59,7 @@ def _read_bop(path: Path, how: Conventions) -> LogRows:
         "`scene` in the camera file.",
     )
     require(how.rate_hz, f"{path}: images are numbered and have no time; state `rate_hz` in the camera file.")
-    # By image and object, the best score first: of each pair the first row stays.
+    # Sorted by image and object, best score first; `unique` then keeps the first row of each pair.
     at = np.flatnonzero(results.where[:, 0] == scene)
     at = at[np.lexsort((-results.score[at], results.where[at, 2], results.where[at, 1]))]
     at = at[np.unique(results.where[at, 1:], axis=0, return_index=True)[1]]

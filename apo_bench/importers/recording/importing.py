@@ -1,4 +1,4 @@
-"""The log of a tracker becomes the observation of a scenario."""
+"""Import the tracks of a log as the observation of one demonstration of a scenario."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ from apo_bench.scenario import Scenario, place_layout
 @final
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
-    """The observation of a recording, and how it was found."""
+    """An observation from a recording, with the intermediate results that led to it."""
 
     scenario: Scenario
     observation: Observation
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
     unclear: tuple[str, ...]
-    """What stays unclear, one sentence each."""
+    """Doubts about the recording, one sentence each."""
 
 
 def import_recording(
@@ -44,12 +44,12 @@ def import_recording(
     file: str,
     models: Mapping[str, Array] | None = None,
 ) -> ImportedRecording:
-    """Return the observation that a log of one demonstration gives.
+    """Return the observation that the tracks of one demonstration give.
 
     Args:
-        tracks: Of parts, camera from part.
-        file: The log, for messages.
-        models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; None: all frames are those of models.
+        tracks: Track of each part, camera from part.
+        file: Name of the log, for messages.
+        models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; None: the identity for all.
 
     Raises:
         InputError: A part is not of the scenario or is missing, the moves are not its operations, or no contact fits.
@@ -78,7 +78,7 @@ def import_recording(
     check_moved(intervals, operations, camera, assembly, file)
     observed = np.array([operation.rest is not None for operation in operations])
     poses = np.tile(np.eye(4), (len(operations), 1, 1))
-    # The error that differs from frame to frame averages out; the one that stays does not.
+    # The error that differs from frame to frame averages out; the constant one is added in full.
     covariance = np.tile(np.diag(UNSEEN_DEVIATION**2), (len(operations), 1, 1))
     for k, (_, rest, *_) in enumerate(operations):
         if rest is not None:
@@ -94,7 +94,7 @@ def import_recording(
         play_m=scenario.clearance_mm * 1e-3,
     )
     if arrangement.camera.covariance is not None and observed.any():
-        # One camera observed all poses: they share the error of its pose.
+        # The error of the camera pose is common to all observed poses.
         sharing = tuple(np.flatnonzero(observed).tolist())
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     unclear = list_doubts(intervals, arrangement, covariance, assembly)
@@ -102,15 +102,16 @@ def import_recording(
 
 
 def planned_starts(scenario: Scenario) -> Poses:
-    """Return where the scenario starts every part, world, [m]."""
+    """Return the start of every part in the scenario, world, [m]."""
     return place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
 def _adjustments(operations: Sequence[LoggedOperation], assembly: Assembly) -> Array:
-    """The square of what later operations moved without need, at the operation that had placed it, (n, 6, 6)."""
+    """Return for each operation the squared twists by which later ones displaced its part, (n, 6, 6), [m, rad]."""
     C = np.zeros((len(assembly), 6, 6))
     for k, operation in enumerate(operations):
         for part, twist in operation.adjusted.items():
+            # Operations that had placed the part before.
             placed = [j for j in range(k) if assembly.operations[j].main == part]
             if placed:
                 C[placed[-1]] += np.outer(twist, twist)

@@ -1,4 +1,4 @@
-"""What the columns of a log mean, by their names, and the unit at the end of a name."""
+"""Recognise the meaning and the unit of a log's columns from their names."""
 
 import re
 from collections.abc import Mapping
@@ -11,15 +11,16 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "angle": {"deg": np.pi / 180.0, "rad": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
 }
-"""Quantity -> unit -> factor to [m], [rad], [s]."""
-POSITION = ("x", "y", "z")
+"""Quantity -> unit -> factor to m, rad or s."""
+POSITION = ("x", "y", "z")  # meanings of columns, here and below
 QUATERNION = ("qw", "qx", "qy", "qz")
-NUMBERED_QUATERNION = ("q0", "q1", "q2", "q3")
+NUMBERED_QUATERNION = ("q0", "q1", "q2", "q3")  # the camera file states their order
 ROTATION_VECTOR = ("rx", "ry", "rz")
 AXIS_AND_ANGLE = ("ax", "ay", "az", "angle")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 EULER_ANGLES = ("roll", "pitch", "yaw")
-NUMBERED_EULER_ANGLES = ("e1", "e2", "e3")
+NUMBERED_EULER_ANGLES = ("e1", "e2", "e3")  # about the axes that `euler` of the camera file states
+# A log has the columns of exactly one of these.
 ROTATIONS = (
     QUATERNION,
     NUMBERED_QUATERNION,
@@ -34,8 +35,10 @@ QUANTITIES: Mapping[str, str] = {
     **dict.fromkeys(POSITION, "length"),
     **dict.fromkeys(("angle", *ROTATION_VECTOR, *EULER_ANGLES, *NUMBERED_EULER_ANGLES), "angle"),
 }
-"""Meaning -> quantity, of columns that have a unit."""
+"""Meaning of a column -> its quantity; other columns have no unit."""
+# meanings that are kept; columns with other names are ignored
 _MEANINGS = {"id", "t", "frame", *POSITION, *(name for names in ROTATIONS for name in names)}
+# other spelling of a meaning -> the meaning; m00 to m22 count from 0, r11 to r33 from 1
 _SYNONYMS = {
     **dict.fromkeys(("object", "object_id", "part", "name", "track", "track_id", "body", "child_frame_id"), "id"),
     **dict.fromkeys(("time", "timestamp", "stamp"), "t"),
@@ -47,7 +50,7 @@ _SYNONYMS = {
 
 
 class LogColumn(NamedTuple):
-    """The meaning of a column, and the unit in its name, which may be empty."""
+    """The meaning of a column, and the unit that its name states, or an empty text."""
 
     meaning: str
     unit: str = ""
@@ -60,16 +63,16 @@ _ROS_FIELDS = {
     **dict.fromkeys(("stamp.nanosec", "stamp.nsecs"), LogColumn("nanoseconds")),
     "header.stamp": LogColumn("stamp"),
 }
-"""The last two names of a field of a ROS message, as `field.pose.position.x` or `/vision/pose/position/x` have it."""
+"""Last two names of a field of a ROS message -> its meaning, as in `/vision/pose/position/x`."""
 
 
 def find_column(name: str) -> LogColumn | None:
-    """Return what a column of this name means; None for a column that is ignored."""
+    """Return the meaning of a column with this name; None for a column that is ignored."""
     *path, name = re.split(r"[./]", name.strip().lower())
     if path and name != "child_frame_id":
         return _ROS_FIELDS.get(f"{path[-1]}.{name}")
     stem, _, unit = name.rpartition("_")
-    if not any(unit in factors for factors in UNITS.values()):
+    if not any(unit in factors for factors in UNITS.values()):  # the last word is no unit
         stem = name
         unit = ""
     meaning = _SYNONYMS.get(stem, stem)

@@ -1,4 +1,4 @@
-"""The table of a log becomes times and poses in metres, camera from model, by the conventions of the camera file."""
+"""Convert the table of a log to times and poses in metres, camera from model, by the conventions of the camera file."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -15,13 +15,13 @@ from apo_bench.importers.recording.log_columns import LogColumn, find_column
 from apo_bench.importers.recording.log_tables import LogTable
 from apo_bench.importers.recording.tracks import LogRows
 
-_LARGEST = 1e20
+_LARGEST = 1e20  # of any number in a log
 _LENGTH_TOLERANCE = 0.02
-"""The norm of a quaternion, of an axis or of a row of a matrix may differ from 1 by this."""
+"""The norm of a quaternion, an axis or a row of a matrix may differ from 1 by this."""
 
 
 def read_rows(table: LogTable, how: Conventions) -> LogRows:
-    """Read the poses of a table.
+    """Read times, ids and poses from a table; poses keep the direction and the handedness of the file.
 
     Raises:
         InputError: A column is missing, twice or without a unit, or a cell is not a finite number.
@@ -38,7 +38,7 @@ def read_rows(table: LogTable, how: Conventions) -> LogRows:
 
 
 def orient(T: Array, how: Conventions) -> tuple[Array, list[str]]:
-    """Return poses as camera from model in right-handed axes, (n, 4, 4), and a note for each change."""
+    """Return poses as camera from model in right-handed axes, (n, 4, 4), and a note for each change that was stated."""
     notes = []
     if how.mirror:
         T = T * mirror(how.mirror)
@@ -50,14 +50,14 @@ def orient(T: Array, how: Conventions) -> tuple[Array, list[str]]:
 
 
 def mirror(axis: str) -> Array:
-    """Return the factors of the elements of a pose that reverse an axis, (4, 4)."""
+    """Return factors for the elements of a pose, (4, 4), that mirror an axis, for element-wise multiplication."""
     flip = np.ones(4)
     flip["xyz".index(axis)] = -1.0
     return np.outer(flip, flip)
 
 
 def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[str, Array]]:
-    """Return the id of each row, and the other columns that mean something, (n,), in [m], [rad], [s]."""
+    """Return the id of each row, and the other known columns by meaning, (n,), in m, rad, s."""
     names = [name.strip().lower() for name in table.names]
     renamed = {theirs.strip().lower(): ours for ours, theirs in how.columns.items()}
     for theirs, ours in renamed.items():
@@ -81,6 +81,7 @@ def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[st
 
 
 def _factor(table: LogTable, column: LogColumn, how: Conventions) -> float:
+    """Return the factor from the unit of a column to m, rad or s."""
     quantity = log_columns.QUANTITIES.get(column.meaning)
     if quantity is None:
         return 1.0
@@ -95,6 +96,7 @@ def _factor(table: LogTable, column: LogColumn, how: Conventions) -> float:
 
 
 def _finite_numbers(cells: Sequence[Any], table: LogTable, column: str) -> Array:
+    """Return the cells of a column as numbers, (n,); raise InputError at a cell that is no finite number."""
     numbers = np.array([_number(cell) for cell in cells])
     wrong = np.flatnonzero(~(np.abs(numbers) <= _LARGEST))
     if len(wrong):
@@ -105,6 +107,7 @@ def _finite_numbers(cells: Sequence[Any], table: LogTable, column: str) -> Array
 
 
 def _number(cell: Any) -> float:
+    """Return a cell as a number; NaN if it is none."""
     try:
         return float(cell)
     except (ValueError, TypeError, OverflowError):
@@ -112,11 +115,11 @@ def _number(cell: Any) -> float:
 
 
 def _read_times(table: LogTable, ids: Sequence[str], cells: Mapping[str, Array], how: Conventions) -> Array:
-    """Return the time of each row, (n,), [s]: from its column, or from the rate of images."""
+    """Return the time of each row, (n,), [s]: from its column, or from its image number and the image rate."""
     if "seconds" in cells:
         return cells["seconds"] + 1e-9 * cells.get("nanoseconds", np.zeros(len(ids)))
     if "stamp" in cells:
-        # ROS writes a stamp in one number as whole nanoseconds.
+        # ROS writes a stamp in a single number as whole nanoseconds.
         stamp = cells["stamp"]
         return stamp * 1e-9 if (stamp == np.round(stamp)).all() else stamp
     if "t" in cells:
@@ -130,9 +133,9 @@ def _read_times(table: LogTable, ids: Sequence[str], cells: Mapping[str, Array],
 
 
 def _count_images(ids: Sequence[str]) -> Array:
-    """Return the image of each row, (n,), from 0: a repeated id begins a new one.
+    """Return the number of each row's image, (n,), from 0: a repeated id begins a new image.
 
-    Of rows that are sorted by id each id counts its own images.
+    If the rows are sorted by id, each id counts its own images.
     """
     runs = [list(run) for _, run in groupby(ids)]
     if len(runs) == len(set(ids)):
@@ -150,7 +153,7 @@ def _count_images(ids: Sequence[str]) -> Array:
 
 
 def _read_rotations(table: LogTable, cells: Mapping[str, Array], how: Conventions) -> tuple[Array, str]:
-    """Return rotation matrices, (n, 3, 3), and a note on how they were read."""
+    """Return rotation matrices, (n, 3, 3), and a note on the convention that was used."""
     found = [names for names in log_columns.ROTATIONS if cells.keys() >= set(names)]
     require(
         len(found) == 1,
@@ -180,14 +183,24 @@ def _read_rotations(table: LogTable, cells: Mapping[str, Array], how: Convention
 
 
 def _stack(cells: Mapping[str, Array], names: Sequence[str]) -> Array:
+    """Return the named columns side by side, (n, k)."""
     return np.column_stack([cells[name] for name in names])
 
 
 def _check_unit_length(vectors: Array, table: LogTable, kind: str) -> None:
+    """Raise InputError unless vectors, (n, k), have length 1.
+
+    Args:
+        kind: Name of such a vector, for the message.
+    """
     _refuse(np.abs(np.linalg.norm(vectors, axis=1) - 1.0) > _LENGTH_TOLERANCE, table, f"{kind} of length 1")
 
 
 def _refuse(wrong: Array, table: LogTable, needed: str) -> None:
-    """Refuse the first wrong row of a mask, (n,)."""
+    """Raise InputError at the first wrong row of a mask, (n,).
+
+    Args:
+        needed: What the message asks for.
+    """
     if wrong.any():
         raise InputError(f"{table.places[int(np.argmax(wrong))]}: {needed} is needed.")

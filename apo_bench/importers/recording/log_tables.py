@@ -1,4 +1,4 @@
-"""Files of logs become tables of text cells: CSV with a header, TUM, and ROS messages in JSON."""
+"""Read log files as tables of text cells: CSV with a header, TUM, and ROS messages in JSON."""
 
 import csv
 import io
@@ -11,18 +11,18 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_separator, read_text
 
 LARGEST_LOG_BYTES = 200_000_000
-_TUM_COLUMNS = ("t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+_TUM_COLUMNS = ("t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")  # TUM files have no line of names
 
 
 class LogTable(NamedTuple):
-    """The cells of a log as they are written, with one row for each pose."""
+    """The cells of a log as written in the file, one row per pose."""
 
     file: Path
     names: Sequence[str]
-    """Of the columns."""
+    """Names of the columns."""
     rows: Sequence[Sequence[Any]]
     places: Sequence[str]
-    """`file, line 3` of each row."""
+    """Location of each row for messages, as `file, line 3`."""
 
 
 def read_csv_table(path: Path) -> LogTable:
@@ -58,7 +58,7 @@ def read_tum_table(path: Path) -> LogTable:
 
 
 def read_ros_json_table(path: Path) -> LogTable:
-    """Read ROS messages in JSON, a list or one a line; the topic is the id where no child_frame_id names one."""
+    """Read ROS messages in JSON, a list or one per line; without a child_frame_id the topic is the id."""
     names: list[str] = []
     rows = []
     places = []
@@ -73,6 +73,7 @@ def read_ros_json_table(path: Path) -> LogTable:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield each message with its location in the file."""
     text = read_text(path, "log", LARGEST_LOG_BYTES)
     try:
         if text.lstrip().startswith("["):
@@ -88,13 +89,14 @@ def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _poses_in(message: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The fields of each pose in a message: its own, those of a message inside it, or those of a TFMessage."""
+    """Yield the fields of each pose in a message: its own, those of an inner message, or those of a TFMessage."""
     message = next((message[key] for key in ("msg", "message", "data") if key in message), message)
     for each in message.get("transforms", [message]):
         yield dict(_flatten(each, ""))
 
 
 def _flatten(value: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield the innermost values with their dotted names."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from _flatten(inner, f"{name}.{key}" if name else key)

@@ -1,4 +1,4 @@
-"""OBJECTS.toml: which id of a log is which part, and where the part's frame lies in the tracker's model."""
+"""Read OBJECTS.toml: the id of each part in the log, and the pose of the part's frame in the tracker's model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
 
 _MOST_IDS = 12
-"""An error names no more ids than this."""
+"""Largest number of ids that an error names."""
 
 
 class ObjectTable(FileTable, frozen=True, kw_only=True):
-    """One part; ids are texts, or whole numbers as in BOP files."""
+    """The table of one part; ids are texts, or whole numbers as in BOP files."""
 
     id: str | int
     frame: AnyPose = AnyPose(at_mm=(0.0, 0.0, 0.0))
 
 
 class ObjectsTable(FileTable, frozen=True, kw_only=True):
-    """The tables of the file."""
+    """The tables of an objects file."""
 
     schema: Literal["apo-bench/objects/1"]
     objects: NamedEntries
@@ -32,26 +32,26 @@ class ObjectsTable(FileTable, frozen=True, kw_only=True):
 
 
 class TrackedPart(NamedTuple):
-    """A part as a tracker knows it."""
+    """The id of a part in the log, and its frame in the tracker's model."""
 
     id: str
     T_model_part: Array
-    """(4, 4), [m]."""
+    """(4, 4), model from part, [m]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ObjectsFile:
-    """The parts that an objects file names."""
+    """The parts and ignored ids of an objects file."""
 
     file: str
     parts: Mapping[str, TrackedPart]
     ignored: frozenset[str]
-    """Ids that are no parts."""
+    """Ids of the log that are no parts."""
 
     @property
     def models(self) -> Mapping[str, Array]:
-        """Part -> where its frame lies in the tracker's model, (4, 4), [m]."""
+        """Part -> pose of its frame in the tracker's model, (4, 4), [m]."""
         return {part: tracked.T_model_part for part, tracked in self.parts.items()}
 
 
@@ -75,7 +75,7 @@ def read_objects(path: str | Path) -> ObjectsFile:
 
 
 def name_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
-    """Return the tracks of parts, camera from part.
+    """Return the track of each part, camera from part.
 
     Raises:
         InputError: An id of the log is no part, or a part is not in the log.

@@ -1,4 +1,4 @@
-"""What a log shows of one operation: where its part was put, along which path, and what moved with it."""
+"""Extract one operation from a log: where its part was put, along which path, and which other parts moved with it."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -12,18 +12,18 @@ from apo_bench.importers.recording.tracks import PoseTrack
 
 
 class LoggedOperation(NamedTuple):
-    """One operation as the log shows it."""
+    """One operation as observed in the log."""
 
     interval: RestInterval | None = None
-    """Where its main part was put; None if that was not observed."""
+    """The rest interval that ends the operation; None if the operation was not observed."""
     rest: Rest | None = None
-    """The rest of it that counts: that at which the next operation began."""
+    """The rest of the interval that counts: the last before the next operation began."""
     path: PoseTrack | None = None
-    """Of the main part, from its interval before to this one, world."""
+    """Path of the main part to this rest, world; None if not observed."""
     carried: Mapping[str, Array] = {}
-    """Carried part -> the body twist by which it moved in the hand, (6,), [m, rad]."""
+    """Carried part -> body twist by which it slipped relative to the main part, (6,), [m, rad]."""
     adjusted: Mapping[str, Array] = {}
-    """Part that the operation does not move -> the body twist by which it moved all the same, (6,)."""
+    """Part that the operation should not move -> body twist by which it moved nevertheless, (6,), [m, rad]."""
 
 
 def observed_operation(
@@ -34,11 +34,12 @@ def observed_operation(
     T_world_camera: Array,
     k: int,
 ) -> LoggedOperation:
-    """Return operation k, counted from 0.
+    """Return operation k, counted from 0, as observed.
 
     Args:
-        tracks: Of parts, camera from part.
-        chosen: The interval with which each operation ends.
+        intervals: Rest intervals of every part, camera from part.
+        tracks: Track of each part, camera from part.
+        chosen: The rest interval that ends each operation; None for operations that were not observed.
     """
     operation = assembly.operations[k]
     interval = chosen[k]
@@ -50,12 +51,12 @@ def observed_operation(
     track = tracks[operation.main]
     among = (track.t >= begins) & (track.t <= rest.begins)
     path = PoseTrack(track.t[among], T_world_camera @ track.T[among])
-    # An operation before it had put its part, also if this one began before that part rested.
+    # Poses before this operation include what earlier operations put, even if their part came to rest after this start.
     before = find_rest_poses(
         intervals, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
     )
     after = find_rest_poses(intervals, over)
-    # The motion of the main part, a displacement in the frame of the camera, moves what stands fast in the hand.
+    # The displacement of the main part, in the frame of the camera, also moves whatever is fixed to it in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])
     carried = {
         part: pose.log(pose.inverse(displacement @ before[part]) @ after[part])

@@ -1,6 +1,6 @@
-"""Find which rest interval of which part ends which operation of a scenario.
+"""Find the rest interval that ends each operation of a scenario.
 
-The last operation that moves a part ends with its last interval. Before, a hand may pause with a part in the air: of
+The last operation of a part should end with its last interval; earlier intervals may be pauses of a hand in the air. Of
 all choices in the order of the operations, the best has long intervals and nearly closed contacts.
 """
 
@@ -16,74 +16,76 @@ from apo_bench.geometry import Array
 from apo_bench.importers.recording.contact_fit import contact_fit
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
-_LONG_S = 1.0
-_WIDE_MM = 50.0
-"""An interval counts its seconds, up to 1; an open contact counts against it, 1 for each 10 mm or degrees, up to 5."""
+_LONG_S = 1.0  # seconds beyond which a longer interval is not worth more
+_WIDE_MM = 50.0  # misfit beyond which a contact is not worse
+"""The worth of an interval is its seconds, up to 1, less 1 for each 10 mm of misfit, up to 5."""
 _LEFT_OVER = 5.0
-"""The penalty of an interval to which no operation leads."""
+"""Penalty for each interval that no operation explains."""
 _OVERLAP_S = 0.3
-"""A part may be taken this time before the previous part rests."""
+"""An operation may take its part this much earlier than the part of the previous operation comes to rest."""
 _CLOSE = 0.3
-"""Choices whose worth differs by less are rivals."""
+"""A second choice whose worth differs by less is a rival."""
 
 
 class Stated(NamedTuple):
-    """Statements of a person about the order, where the log leaves it open."""
+    """The user's statements about the order, where the log is ambiguous."""
 
     ends: tuple[float, ...] = ()
-    """Times at which the operations ended, [s]."""
+    """Times at which the operations ended, [s]; empty: not stated."""
     unseen: tuple[int, ...] = ()
-    """Operations that the log does not show, counted from 0."""
+    """Operations that were not observed, counted from 0."""
 
 
 Chosen = tuple[RestInterval | None, ...]
-"""The interval with which each of the first operations ends; None of one that was not observed."""
+"""The rest interval that ends each of the first operations; None for those not observed."""
 
 
 class NoMatchingOrder(InputError):
-    """The moves of a log are not those of the scenario."""
+    """The motions in the log do not match the operations of the scenario."""
 
 
 class Order(NamedTuple):
-    """The intervals that end the operations."""
+    """The rest intervals that end the operations."""
 
     intervals: Chosen
     rival: Chosen | None
-    """Another choice that is nearly as good."""
+    """A second choice that is nearly as good, if there is one."""
 
 
 class _Choice(NamedTuple):
-    """The intervals of the first operations."""
+    """A choice of intervals for the first operations, with its worth."""
 
     worth: float
     begins: float
-    """Of the last interval, [s]."""
+    """Begin of the last interval, [s]."""
     intervals: Chosen
 
 
 def find_order(
     assembly: Assembly, intervals: RestIntervals, start: Poses, T_world_camera: Array, unseen: Sequence[int]
 ) -> Order:
-    """Return the best choice.
+    """Return the best choice of intervals, with its rival.
 
     Args:
-        intervals: Of every tracked part, in the frame of the camera.
-        start: Where parts stand that are not tracked, world, [m].
-        unseen: Operations, counted from 0, that the log does not show.
+        intervals: Rest intervals of every tracked part, in the frame of the camera.
+        start: Poses of parts that are not tracked, world, [m].
+        unseen: Operations that were not observed, counted from 0.
 
     Raises:
         NoMatchingOrder: No choice has the order of the operations.
     """
+    # Part -> its last observed operation.
     last = {operation.main: k for k, operation in enumerate(assembly.operations) if k not in unseen}
 
     @cache
     def worth(k: int, interval: RestInterval) -> float:
+        """Return the worth of an interval as the end of operation k."""
         known = intervals[interval.part]
         poses = {part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}
         wrong_mm = contact_fit(assembly, k, {**start, **poses}).wrong_mm
         is_carried_later = any(interval.part in other.carries for other in assembly.operations[k + 1 :])
         is_last = last[interval.part] == k and not is_carried_later
-        left = len(known) - 1 - known.index(interval) if is_last else 0
+        left = len(known) - 1 - known.index(interval) if is_last else 0  # later intervals that no operation explains
         return min(interval.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0 - _LEFT_OVER * left
 
     best = _best_choices(assembly, intervals, worth, unseen)
@@ -92,7 +94,7 @@ def find_order(
 
 
 def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[float]) -> Order:
-    """Return the intervals at stated times, one for each operation.
+    """Return the intervals that contain the stated times, one for each operation.
 
     Raises:
         InputError: There is not one time for each operation, or a part does not rest there.
@@ -115,7 +117,7 @@ def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[fl
 
 
 def describe_moves(intervals: RestIntervals) -> str:
-    """Return which part came to rest when, for an error."""
+    """Return the times at which parts came to rest as text, for an error message."""
     arrivals = sorted((each.begins, part) for part, known in intervals.items() for each in known[1:])
     return ", ".join(f"{part} {t:.1f} s" for t, part in arrivals[:12]) or "none"
 
@@ -123,10 +125,14 @@ def describe_moves(intervals: RestIntervals) -> str:
 def _best_choices(
     assembly: Assembly, intervals: RestIntervals, worth: Callable[[int, RestInterval], float], unseen: Sequence[int]
 ) -> list[_Choice]:
-    """The two best choices whose arrivals have the order of the operations, the best first.
+    """Return at most two choices whose intervals are in the order of the operations, the best first.
 
-    Dynamic programming over operations: the future depends on a choice by its last interval only, but for carried
-    parts; so the two best of the choices that end with the same interval are followed.
+    Dynamic programming over operations: what follows depends on a choice only by its last interval, except for carried
+    parts. So the two best choices that end with the same interval are kept.
+
+    Args:
+        worth: Function of an operation, counted from 0, and the interval that ends it.
+        unseen: Operations that were not observed, counted from 0.
     """
     choices = [_Choice(0.0, -np.inf, ())]
     for k, operation in enumerate(assembly.operations):
@@ -135,9 +141,10 @@ def _best_choices(
             continue
         by_end: dict[RestInterval, list[_Choice]] = {}
         for choice in choices:
-            for interval in intervals[operation.main][1:]:
+            for interval in intervals[operation.main][1:]:  # the first interval is the start
                 moved_on = _moves_between(assembly, intervals, choice.intervals, interval)
                 if interval.begins > choice.begins and moved_on is not None:
+                    # Intervals that contradict the order.
                     amiss = moved_on + _strangers(intervals, operation.moves, choice.begins, interval)
                     value = choice.worth + worth(k, interval) - _LEFT_OVER * amiss
                     longer = _Choice(value, interval.begins, (*choice.intervals, interval))
@@ -155,11 +162,18 @@ def _best_choices(
 
 
 def _best_two(choices: list[_Choice]) -> list[_Choice]:
+    """Return the two choices of greatest worth, the best first."""
     return sorted(choices, key=lambda choice: -choice.worth)[:2]
 
 
 def _strangers(intervals: RestIntervals, moved: Collection[str], t: float, until: RestInterval) -> int:
-    """How many parts that an operation does not move came to another place after the end of the one before."""
+    """Return how many parts that an operation does not move came to rest elsewhere during it.
+
+    Args:
+        moved: Parts that the operation moves.
+        t: Begin of the last interval of the operation before, [s].
+        until: The interval that ends the operation.
+    """
     return sum(
         any(t + _OVERLAP_S < other.begins < until.begins + _OVERLAP_S for other in known[1:])
         for part, known in intervals.items()
@@ -170,15 +184,18 @@ def _strangers(intervals: RestIntervals, moved: Collection[str], t: float, until
 def time_taken(
     assembly: Assembly, intervals: RestIntervals, before: Sequence[RestInterval | None], interval: RestInterval
 ) -> float:
-    """Return when the part of an operation was taken, [s]: at the end of where an earlier one left it, else its start.
+    """Return the time at which the part of an operation was taken, [s].
+
+    It is the end of the interval in which an earlier operation left the part, or of its start.
 
     Args:
-        before: The intervals of the operations before it.
-        interval: Where it was put.
+        before: The intervals that end the operations before this one.
+        interval: The interval that ends this operation.
     """
     part = interval.part
     own = [(k, each) for k, each in enumerate(before) if each is not None and each.part == part]
-    since = own[-1][0] + 1 if own else 0
+    since = own[-1][0] + 1 if own else 0  # the first operation after that which put the part
+    # A carrier moved the part since, so the interval just before counts.
     is_carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
     if own and not is_carried:
         return own[-1][1].gone
@@ -189,7 +206,11 @@ def time_taken(
 def end_of_operation(
     assembly: Assembly, intervals: RestIntervals, chosen: Sequence[RestInterval | None], k: int
 ) -> float:
-    """Return when operation k, which was observed, was over, [s]: when the next one took its part, else its end."""
+    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest.
+
+    Args:
+        chosen: The interval that ends each operation.
+    """
     interval = chosen[k]
     assert interval is not None
     for j, later in enumerate(chosen):
@@ -200,9 +221,13 @@ def end_of_operation(
 
 
 def _moves_between(assembly: Assembly, intervals: RestIntervals, before: Chosen, interval: RestInterval) -> int | None:
-    """How often the part of the last chosen operation still moved before the part of the next one was taken.
+    """Return how often the part of the operation before still moved until the next part was taken.
 
-    None if the latter was taken before the former was there: a carried part arrives with its carrier.
+    None if the next part was taken before the part of the operation before came to rest, which excludes this choice.
+
+    Args:
+        before: The intervals that end the operations before.
+        interval: The interval that ends the next operation.
     """
     last = before[-1] if before else None
     if last is None:

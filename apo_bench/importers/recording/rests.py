@@ -1,8 +1,8 @@
-"""Find where a part rests: the frames between two changes of its pose.
+"""Find the rests of a part in its track: the stretches of frames between changes of its pose.
 
-A frame is still if the medians of the frames just before and just after it agree within the noise of the track itself;
-a stretch of still frames is a rest. Small shifts that no such window shows, such as those of a part that is adjusted by
-two millimetres, split a rest in two where its two sides differ by more than chance.
+A frame is still if the medians of the frames just before and just after it agree within the noise of the track. A
+stretch of still frames is a rest. Smaller shifts, such as an adjustment by two millimetres, do not show in such a
+window; they split a rest where its two sides differ by more than chance.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -16,42 +16,41 @@ from apo_bench.importers.recording.averaging import Mean, average, common_scatte
 from apo_bench.importers.recording.tracks import PoseTrack
 
 LEAST_REST_S = 0.3
-"""Least duration of a rest."""
+"""Shortest rest."""
 _FEWEST = 4
-"""Frames of a rest."""
+"""Smallest number of frames of a rest."""
 _ENOUGH_HZ = 30.0
-"""Frames a second in which rests are searched."""
+"""Frame rate at which rests are searched; faster tracks are thinned out."""
 _LEAST = copy_frozen(np.repeat([2e-4, 1.7e-3], 3), 6)
-"""Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
+"""Smallest noise per axis that is assumed: 0.2 mm, 0.1 deg."""
 _STILL = 5.3
-"""sqrt of the 99.99 % quantile of chi-square with 6 degrees of freedom."""
+"""A frame is still below this: sqrt of the 99.99 % quantile of chi-square with 6 degrees of freedom."""
 _MEDIAN = 1.77
-"""Standard deviation of the difference of two medians of m numbers, times sqrt(m)."""
+"""Standard deviation of the difference of two medians of m unit Gaussian numbers, times sqrt(m)."""
 _SHIFTED = 60.0
-"""Chi-square with 6 degrees of freedom beyond which a rest is two: no chance, over all frames of a log."""
-_SAME_M = 3e-4
-_SAME_RAD = 5e-3
-"""Rests that differ by less are one."""
+"""A rest is split beyond this chi-square with 6 degrees of freedom, which chance does not reach in a whole log."""
+_SAME_M = 3e-4  # smallest shift that splits a rest
+_SAME_RAD = 5e-3  # the same for a rotation
 _EDGE = 16.8
-"""The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
+"""Frames at the ends of a rest beyond this 99 % quantile of chi-square with 6 degrees of freedom are in motion."""
 _Item = TypeVar("_Item")
 _Span = tuple[int, int]
-"""First and last frame."""
+"""First and last frame of a stretch."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """A stretch of a track in which the part rests."""
+    """A stretch of a track in which the part rests, with its mean pose."""
 
-    first: int
+    first: int  # first frame of the track
     last: int
-    """Frames of the track."""
-    begins: float
+    """Last frame of the track."""
+    begins: float  # [s]
     ends: float
     """[s]."""
     gone: float
-    """When the part may have been there last, [s]: later than `ends` where it was hidden then."""
+    """The time until which the part may have been there, [s]: later than `ends` if it was hidden afterwards."""
     mean: Mean
 
     @property
@@ -60,7 +59,7 @@ class Rest:
 
 
 def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
-    """Return the rests of a track, in order of time: found in frames that are new, averaged over all frames."""
+    """Return the rests of a track in order of time; they are found in thinned-out frames and averaged over all."""
     stride = _stride(track)
     t = track.t[::stride]
     T = track.T[::stride]
@@ -74,7 +73,7 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
         a, b = _trim(T, *span, noise)
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    # Neighbouring spans of one pose become one, unless the part left and returned.
+    # Merge neighbouring spans at one pose, unless the part left and returned in between.
     groups = group_consecutive(
         spans, lambda group, span: _is_one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window)
     )
@@ -83,10 +82,10 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
     hidden_s = max(LEAST_REST_S, (2 * _FEWEST - 1) * period_s)
-    last_seen = np.flatnonzero(np.diff(track.t) > hidden_s)
+    last_seen = np.flatnonzero(np.diff(track.t) > hidden_s)  # gaps in which the part was not tracked
     rests = []
     for (a, b), mean in zip(spans, means, strict=True):
-        # The last frames of a rest may be off by chance, so that it ends a few frames before the part was hidden.
+        # The last frames of a rest may be trimmed by chance, so a gap may begin a few frames after its end.
         seen_again = [float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride]
         begins, ends_s = float(track.t[a]), float(track.t[b])
         rests.append(Rest(a, b, begins, ends_s, max(seen_again, default=ends_s), pool_mean(mean, common)))
@@ -94,7 +93,7 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
 
 
 def _stride(track: PoseTrack) -> int:
-    """Every how many frames one is new: trackers repeat a pose until there is another, or smooth over many a second."""
+    """Return the step between frames to search, since trackers repeat poses, or smooth them at high rates."""
     if len(track.t) < 2:
         return 1
     changes = np.flatnonzero((np.diff(track.T, axis=0) != 0.0).any(axis=(1, 2)))
@@ -104,9 +103,9 @@ def _stride(track: PoseTrack) -> int:
 
 
 def _noise(T: Array) -> Array:
-    """Standard deviation of one frame along and about each axis, (6,), from differences of neighbours.
+    """Return the standard deviation of one frame along and about each axis, (6,), from successive differences.
 
-    Parts rest most of the time, so the median of the differences is that of a part that rests.
+    Parts rest most of the time, so the median of the differences is that of a resting part.
     """
     # 1.4826 times the median of |x| is the deviation of a Gaussian; a difference of two frames has sqrt(2) times it.
     d = pose.log(pose.inverse(T[:-1]) @ T[1:])
@@ -114,7 +113,12 @@ def _noise(T: Array) -> Array:
 
 
 def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
-    """First and last frame of each stretch of still frames, with the half windows at its ends."""
+    """Return first and last frame of each stretch of still frames, extended by half a window at both ends.
+
+    Args:
+        noise: (6,), standard deviation of one frame per axis.
+        m: Frames in half a window.
+    """
     n = len(T)
     if n <= 2 * m:
         return [(0, n - 1)]
@@ -123,7 +127,7 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
     xi = pose.log(pose.inverse(T[m : n - m])[:, None] @ T[window])
     change = np.median(xi[:, m + 1 :], axis=1) - np.median(xi[:, :m], axis=1)
     still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
-    # First and last index of each run; where the half windows of two overlap, each gets half of what they share.
+    # First and last frame of each run; where the half windows of two runs overlap, they are divided in the middle.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     first, last = np.add(edges.reshape(-1, 2), (0, 2 * m - 1)).T
     shared = first[1:] <= last[:-1]
@@ -134,8 +138,14 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
 
 
 def _trim(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
-    """Without frames at the ends that still move: three in a row of them belong to the rest."""
-    quarter = (b - a + 1) // 4
+    """Remove frames at the ends that still move, until three good frames in a row; return first and last frame.
+
+    Args:
+        T: (n, 4, 4), poses of all frames.
+        a, b: First and last frame of the stretch.
+        noise: (6,), standard deviation of one frame per axis.
+    """
+    quarter = (b - a + 1) // 4  # the mean is taken over the middle half of the stretch
     off = pose.log(pose.inverse(average(T[a + quarter : b + 1 - quarter]).T) @ T[a : b + 1])
     near = ((off / noise) ** 2).sum(axis=1) < _EDGE
     good = np.flatnonzero(np.convolve(near, np.ones(3), "valid") == 3)
@@ -143,14 +153,20 @@ def _trim(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
 
 
 def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
-    """The stretch, or its parts between small shifts."""
+    """Split a stretch at small shifts, recursively, and return the parts.
+
+    Args:
+        T: (n, 4, 4), poses of all frames.
+        a, b: First and last frame of the stretch.
+        noise: (6,), standard deviation of one frame per axis.
+    """
     n = b - a + 1
     if n < 2 * _FEWEST:
         return [(a, b)]
     xi = np.clip(pose.log(pose.inverse(average(T[a : b + 1]).T) @ T[a : b + 1]) / noise, -4.0, 4.0)
     sums = np.cumsum(xi, axis=0)
-    # With the frame before which it is cut after k of n: the squared difference of the two means in units of its
-    # variance 1/k + 1/(n - k) is chi-square with 6 degrees of freedom if there is no shift.
+    # For a cut after k of n frames: the squared difference of the two means, over its variance 1/k + 1/(n - k), is
+    # chi-square with 6 degrees of freedom if there is no shift.
     k = np.arange(1, n)
     gap = sums[:-1] / k[:, None] - (sums[-1] - sums[:-1]) / (n - k)[:, None]
     chi = (gap**2).sum(axis=1) * k * (n - k) / n / _alike(xi)
@@ -164,10 +180,9 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
 
 
 def _alike(xi: Array) -> float:
-    """How many times the variance of a mean is that of independent frames: errors of neighbours may be correlated.
+    """Return the variance of a mean relative to that of independent frames, as errors of neighbouring frames correlate.
 
-    It follows from differences, which a shift of the mean does not change: their mean square is 2 (1 - r) times the
-    variance.
+    The correlation is estimated from differences, which a shift of the mean does not change.
     """
     # Neighbours differ by 2 (1 - r) v in the mean square, frames that are far apart by 2 v. The variance of a mean of
     # errors with correlation r from frame to frame is (1 + r) / (1 - r) times that of independent ones.
@@ -179,7 +194,11 @@ def _alike(xi: Array) -> float:
 
 
 def group_consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
-    """Items in their order, in groups: each with those just before it, if it belongs to them."""
+    """Group consecutive items.
+
+    Args:
+        belongs: Whether an item belongs to the group just before it.
+    """
     groups: list[list[_Item]] = []
     for item in items:
         if groups and belongs(groups[-1], item):
@@ -190,6 +209,13 @@ def group_consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item]
 
 
 def _is_one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
+    """Whether two stretches are one rest: their means agree, and the part did not leave in between.
+
+    Args:
+        before, after: First and last frame of each stretch.
+        noise: (6,), standard deviation of one frame per axis.
+        m: Frames in half a window; a shorter gap is not tested.
+    """
     mean, mean_after = (average(T[a : b + 1]) for a, b in (before, after))
     off = pose.log(pose.inverse(mean.T) @ mean_after.T)
     deviation = noise * np.sqrt(1.0 / mean.independent + 1.0 / mean_after.independent)

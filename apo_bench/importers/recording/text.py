@@ -1,4 +1,4 @@
-"""The lines that a person reads of an import, and the rows of its CSV files."""
+"""Format the result of an import as lines for the terminal and as rows of CSV files."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,16 +15,18 @@ from apo_bench.importers.recording.rests import Rest
 from apo_bench.importers.recording.tracks import Log
 from apo_bench.io import align_columns
 
+# Heads of the table of rests.
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "deviation of a frame")
 POSE_HEAD = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+# Columns of an observation file.
 OBSERVATION_HEAD = ("operation", "part", *POSE_HEAD, "deviation_mm", "deviation_deg", "seen")
-PATH_HEAD = ("operation", "part", "t_s", *POSE_HEAD)
+PATH_HEAD = ("operation", "part", "t_s", *POSE_HEAD)  # columns of a file of paths
 _POSE_UNITS = copy_frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
-"""mm for m of a packed pose."""
+"""Factors from a packed pose, [m], to mm."""
 
 
 def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
-    """Return how a log and the frames of its parts were read."""
+    """Return lines on the log, its conventions and the frames of its parts: pairs of label and text."""
     times = [track.t for track in log.tracks.values()]
     seconds = max(float(t[-1]) for t in times)
     lines = [
@@ -37,7 +39,7 @@ def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
 
 
 def camera_lines(camera: CameraPose) -> list[tuple[str, str]]:
-    """Return where the camera stands, and how well known places agree."""
+    """Return lines on the pose of the camera and its residuals at known places: pairs of label and text."""
     stands = f"{_pose_text(camera.T_world_camera)}; its axes are those of OpenCV"
     if not camera.residuals:
         return [("camera", f"as stated: {stands}")]
@@ -46,7 +48,7 @@ def camera_lines(camera: CameraPose) -> list[tuple[str, str]]:
 
 
 def imported_lines(recording: ImportedRecording) -> list[tuple[str, str]]:
-    """Return what is known of starts and contacts, what moved, and what stays unclear."""
+    """Return lines on starts, contacts, displaced parts and doubts: pairs of label and text."""
     fit = recording.arrangement.fit
     starts = ", ".join(f"{part} {source}" for part, source in recording.arrangement.start_source.items())
     lines = [
@@ -60,7 +62,7 @@ def imported_lines(recording: ImportedRecording) -> list[tuple[str, str]]:
 
 
 def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array) -> list[str]:
-    """Return one line for each operation: when its part came to rest, where, and how frames scatter.
+    """Return a table with one line per operation: times, place and scatter of the rest of its part.
 
     Args:
         rests: Part and rest of each operation.
@@ -82,13 +84,15 @@ def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array) -> list[str]:
 def observation_rows(
     parts: Sequence[str], poses: Array, rests: Sequence[Rest | None], camera: CameraFile
 ) -> Iterator[tuple[object, ...]]:
-    """Return the rows of an observation file as CSV, mm and degrees.
+    """Yield the rows of an observation in CSV form, in mm and degrees.
 
     Args:
+        parts: Main part of each operation.
+        rests: Rest that ends each operation; None if not observed.
         poses: (n, 4, 4), world, [m].
     """
     for k, (part, T, rest) in enumerate(zip(parts, poses, rests, strict=True), start=1):
-        m, rad = 1.0, 1.0
+        m, rad = 1.0, 1.0  # without a rest: 1 m and 1 rad, so practically unknown
         if rest is not None:
             m, rad = per_axis(rest.mean.covariance + rest_error(camera, rest.mean))
         packed = (pose.pack(T) * _POSE_UNITS).round(9).tolist()
@@ -96,7 +100,7 @@ def observation_rows(
 
 
 def path_rows(recording: ImportedRecording) -> Iterator[tuple[object, ...]]:
-    """Return the paths between rests: operation, part, time, pose in the world."""
+    """Yield the paths between rests: operation, part, time, and pose in the world in mm."""
     for k, observed in enumerate(recording.operations, start=1):
         if observed.path is not None and observed.interval is not None:
             for t, T in zip(*observed.path, strict=True):
@@ -104,6 +108,7 @@ def path_rows(recording: ImportedRecording) -> Iterator[tuple[object, ...]]:
 
 
 def _pose_text(T: Array) -> str:
+    """Return a pose as text: position in mm, and rotation vector in degrees."""
     turn = Rotation.from_matrix(T[:3, :3]).as_rotvec(degrees=True)
     return f"at {_vector_text(1e3 * T[:3, 3])} mm, turned by {_vector_text(turn)} deg"
 
@@ -113,4 +118,5 @@ def _vector_text(v: Array) -> str:
 
 
 def _size_text(twist: Array) -> str:
+    """Return the lengths of a twist, [m, rad], as text in mm and degrees."""
     return f"{1e3 * np.linalg.norm(twist[:3]):.2f} mm {np.degrees(np.linalg.norm(twist[3:])):.2f} deg"

@@ -1,4 +1,4 @@
-"""The tracks of a log: the poses of each model over time, in the frame of the camera."""
+"""The tracks of a log, the poses of each model over time in the frame of the camera, and checks of units and times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 
-_NEAREST_M = 0.02
-_FARTHEST_M = 20.0
-"""A median distance to the camera outside of these is in another unit."""
-_FASTEST_S = 2e-4
-_SLOWEST_S = 2.0
-"""A median time between two frames outside of these is in another unit."""
+_NEAREST_M = 0.02  # smallest median distance to the camera
+_FARTHEST_M = 20.0  # largest median distance to the camera
+"""Beyond these limits, lengths must be in another unit."""
+_FASTEST_S = 2e-4  # smallest median time between frames
+_SLOWEST_S = 2.0  # largest median time between frames
+"""Beyond these limits, times must be in another unit."""
 
 
 class PoseTrack(NamedTuple):
-    """One model over time."""
+    """The poses of one model over time."""
 
     t: Array
-    """(n,), [s], from the first pose of the log, increasing."""
+    """(n,), increasing, [s], from the first pose of the log."""
     T: Array
     """(n, 4, 4), camera from model, [m]."""
 
@@ -29,16 +29,16 @@ class PoseTrack(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A whole log."""
+    """All tracks of a log, by id."""
 
     file: str
     tracks: Mapping[str, PoseTrack]
     notes: tuple[str, ...]
-    """How its numbers were read: units, order of the quaternion, direction."""
+    """How the numbers were read: units, order of the quaternion, direction."""
 
 
 class LogRows(NamedTuple):
-    """Poses as they stand in a file, in its order."""
+    """The poses of a log in the order of the file."""
 
     ids: Sequence[str]
     t: Array
@@ -46,13 +46,16 @@ class LogRows(NamedTuple):
     T: Array
     """(n, 4, 4), [m]."""
     places: Sequence[str]
-    """Where each stands: `file, line 3`."""
+    """Location of each row for messages, as `file, line 3`."""
     notes: Sequence[str]
-    """How they were read."""
+    """How the numbers were read."""
 
 
 def sort_rows(file: str, rows: LogRows) -> Log:
-    """Return the tracks of a log, each with increasing times.
+    """Sort the rows of a log into tracks, each with increasing times.
+
+    Args:
+        file: Name of the log, for messages.
 
     Raises:
         InputError: The log is empty, a time stands twice or runs backwards, or a unit is another one.
@@ -60,7 +63,7 @@ def sort_rows(file: str, rows: LogRows) -> Log:
     require(len(rows.t), f"{file}: no pose stands in the file; give a log with one row per pose.")
     tracks = {}
     lost = 0
-    # A tracker writes the identity where it lost a model, unless the model has no other pose.
+    # Trackers write the identity when they lose a model; keep it if the model has no other pose.
     is_identity = (np.eye(4) == rows.T).all(axis=(1, 2))
     names = np.array(rows.ids, dtype=object)
     for name in sorted(set(rows.ids)):

@@ -1,4 +1,4 @@
-"""The order of operations from a log alone: parts that move together are one operation."""
+"""Find the order of operations in a log without a scenario: parts that move together are one operation."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -13,7 +13,7 @@ from apo_bench.importers.recording.tracks import PoseTrack
 
 
 class ObservedPlacement(NamedTuple):
-    """A part was put somewhere, perhaps with others."""
+    """One operation: a part was put down, perhaps with carried parts."""
 
     part: str
     carries: tuple[str, ...]
@@ -21,7 +21,7 @@ class ObservedPlacement(NamedTuple):
 
 
 class UnplannedRecording(NamedTuple):
-    """A recording without a scenario."""
+    """The camera, rest intervals and operations of a recording without a scenario."""
 
     camera: CameraPose
     intervals: RestIntervals
@@ -29,17 +29,20 @@ class UnplannedRecording(NamedTuple):
 
 
 class _Move(NamedTuple):
-    taken: float
+    """A motion of a part from one rest interval to the next."""
+
+    taken: float  # [s]
     to: RestInterval
 
 
 def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, file: str) -> UnplannedRecording:
-    """Return the order of operations as far as poses alone show it.
+    """Return the order of operations as far as the poses alone show it.
 
     Raises:
         InputError: The camera file states no pose, or nothing moves.
     """
     intervals = find_all_intervals(tracks)
+    # Without a scenario no part starts at a planned place.
     known = {part: T for part, T in camera.known.items() if T is not None}
     found = find_camera(intervals, CameraFile(camera.conventions, camera.T_world_camera, known, camera.stays), {})
     moves = [_Move(before.ends, after) for known in intervals.values() for before, after in pairwise(known)]
@@ -50,13 +53,13 @@ def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, fil
 
 
 def _is_together(move: _Move, other: _Move) -> bool:
-    """Whether two parts moved at the same time, for more than half of the shorter move."""
+    """Whether two parts moved together, for more than half of the shorter motion."""
     shared = min(move.to.begins, other.to.begins) - max(move.taken, other.taken)
     shorter = min(move.to.begins - move.taken, other.to.begins - other.taken)
     return move.to.part != other.to.part and shared > 0.5 * shorter
 
 
 def _place(moves: Sequence[_Move]) -> ObservedPlacement:
-    """The hand held the part that was taken first."""
+    """Return motions that belong together as one operation; the part that was taken first is the main part."""
     first, *others = sorted(moves, key=lambda move: move.taken)
     return ObservedPlacement(first.to.part, tuple(move.to.part for move in others), first.to.rests[-1])

@@ -1,4 +1,4 @@
-"""The share of a change between two range images that a model explains."""
+"""The score of a located model: the share of a change between two range images that it explains."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,11 +11,11 @@ from apo_bench.perception.depth_camera.rays import RayCaster
 from apo_bench.perception.depth_camera.regions import Mask
 
 _CLOSE_M = 0.005
+"""A pixel agrees with a model if their distances differ by less than this."""
 _CLOSE_DEVIATIONS = 2.5
-"""A pixel agrees with a model within this, or so many standard deviations of one ray; noise in a smoothed image is half
-of that."""
+"""Or by less than so many standard deviations of one ray; smoothing halves the noise."""
 _AROUND = 12
-"""Pixels around a region that a wrong model may cover."""
+"""Margin around a changed region, in pixels, in which a wrong model is penalised."""
 
 
 def measure_share(
@@ -26,11 +26,15 @@ def measure_share(
     appeared: Sequence[Mask],
     noise_m: float,
 ) -> float:
-    """The share of pixels that agree with parts at these poses, 0 to 1, of those that appeared or that they hide.
+    """The fraction, 0 to 1, of the compared pixels that agree with parts at these poses.
+
+    Compared are the pixels that appeared, and those that the parts would hide though the image shows what is behind.
 
     Args:
+        poses: Part -> (4, 4), world, [m].
         images: (views, height, width), measured distances, smoothed, [m].
-        appeared: Per view.
+        appeared: Per view, pixels that are nearer than before.
+        noise_m: Standard deviation of one ray.
     """
     close = max(_CLOSE_M, _CLOSE_DEVIATIONS * noise_m)
     good = 0
@@ -42,7 +46,7 @@ def measure_share(
         measured = measured[np.isfinite(measured)]
         expected, _ = cast(poses, view.origin, view.rays[pixels])
         new = mask.ravel()[pixels]
-        # Against the model: what appeared and is not its surface, and what stayed though it would hide that.
+        # Bad pixels: new ones off the surface of the model, and old ones behind a surface that the model puts there.
         agrees = np.abs(expected - measured) < close
         good += int((new & agrees).sum())
         bad += int((new & ~agrees).sum() + (~new & (expected < measured - close)).sum())
@@ -50,7 +54,7 @@ def measure_share(
 
 
 def _around(mask: Mask) -> NDArray[np.int64]:
-    """Every second pixel of every second row in the rectangle around a region, by number."""
+    """Flat indices of every second pixel of every second row in the rectangle around a region, with a margin."""
     height, width = mask.shape
     rows = np.flatnonzero(mask.any(axis=1))
     columns = np.flatnonzero(mask.any(axis=0))

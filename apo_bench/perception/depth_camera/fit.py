@@ -1,4 +1,4 @@
-"""Fit a surface to measured points with small_gicp, with the covariance of the fit."""
+"""Fit the pose of a surface to measured points (point-to-plane ICP of small_gicp), with its covariance."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,54 +11,60 @@ from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.perception.depth_camera.surface import Surface, load_small_gicp
 
 _LEAST_NOISE_M = 0.0001
-"""What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
+"""Least standard deviation of one point, [m]: the shape is known to a tenth of a millimetre at best."""
 BENT_M = 0.003
-"""Noise of this size doubles the covariance: near an edge the nearest surface is then often not the one that was
-hit, which the linear part of the formula does not know. `benchmarks/depth_camera.py` measures it."""
+"""Noise of this size doubles the covariance: near an edge the nearest surface is often not the one that the ray hit,
+which the linear formula neglects. `benchmarks/depth_camera.py` measures it."""
 PRIOR = copy_frozen([0.05] * 3 + [0.5] * 3, 6)
-"""Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say
-nothing, and states for them how little that is."""
+"""Standard deviation of a pose before any measurement, [m, rad]. It keeps the covariance finite in directions that the
+points do not determine."""
 _WIDTHS = 2.0
-"""Points that are farther away than so many widths belong to something else."""
+"""A point farther from the surface than so many widths is taken as part of something else."""
 _END_M = 1e-8
-"""A fit ends with a step that is shorter, [m, rad]."""
+"""A fit ends when a step is shorter, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Measured points of one part, seen from several views."""
+    """Measured points of one part, from several views."""
 
     at: Array
     """(n, 3), world, [m]."""
     ray: Array
     """(n, 3), unit vectors along which they were measured, world."""
     view: Array
-    """(n,), number of the view."""
+    """(n,), index of the view."""
 
     def __len__(self) -> int:
         return len(self.at)
 
     def only(self, kept: NDArray[Any]) -> "Points":
-        """Some of them."""
+        """The points that a mask (n,) or an array of indices selects."""
         return Points(self.at[kept], self.ray[kept], self.view[kept])
 
     def thinned(self, n: int) -> "Points":
-        """About n of them, evenly out of their order."""
+        """At most n points, evenly spaced in their order."""
         return self if len(self) <= n else self.only(np.linspace(0, len(self) - 1, n).round().astype(int))
 
 
 class Fits(NamedTuple):
-    """Several fits of one surface to the same points."""
+    """Several fits of one surface to the same points, one per start pose."""
 
     T: Array
-    """(s, 4, 4), world."""
+    """(s, 4, 4), fitted poses, world, [m]."""
     cost: Array
-    """(s,), mean of the squared distances over the largest that counts, 0 to 1."""
+    """(s,), mean squared distance, relative to the square of the largest distance that counts, 0 to 1."""
 
 
 def refine_fit(surface: Surface, points: Points, starts: Iterable[Array], width_m: float, turns: int) -> Fits:
-    """Go down from every start (s, 4, 4): the least distances of the points from the planes of the surface."""
+    """Minimise the distances of the points from the tangent planes of the surface, from every start pose.
+
+    Args:
+        starts: (s, 4, 4), poses of the surface, world, [m].
+        width_m: Points farther from the surface than twice this width are ignored.
+        turns: Iterations at most.
+    """
     gicp = load_small_gicp()
     source = gicp.PointCloud(points.at)
     reach = _WIDTHS * width_m
@@ -77,17 +83,22 @@ def refine_fit(surface: Surface, points: Points, starts: Iterable[Array], width_
             translation_epsilon=_END_M,
         )
         T.append(pose.inverse(found.T_target_source))
-        # Of points that count the error is half of the squared distance; all others are as far as the farthest.
+        # The error is the sum of half the squared distances of the inliers; each outlier counts as the full reach.
         cost.append(2.0 * found.error / reach**2 + len(points) - found.num_inliers)
     return Fits(np.array(T), np.array(cost) / len(points))
 
 
 def covariance(surface: Surface, points: Points, T: Array, width_m: float, noise_m: float, bias_m: float) -> Array:
-    """(6, 6), of the body twist by which a fit at T is wrong, [m, rad].
+    """The covariance (6, 6) of the body twist of the error of a fit at pose T, [m, rad].
 
-    The minimum moves by H^-1 J^t e if the points are wrong by e, so with independent noise and one common error per
-    view the covariance is H^-1 J^t (N + sum_v b_v b_v^t) J H^-1; an error along a ray counts by the cosine between ray
-    and normal. `PRIOR` stands for what no point says, `BENT_M` for what is not linear.
+    Errors e of the points move the minimum by H^-1 J^t e. With independent noise and one common error per view the
+    covariance is H^-1 J^t (N + sum_v b_v b_v^t) J H^-1. An error along a ray counts by the cosine between ray and
+    normal. `PRIOR` covers directions that no point determines, `BENT_M` the nonlinearity.
+
+    Args:
+        T: (4, 4), pose of the surface, world, [m].
+        noise_m: Standard deviation of the independent error of a ray.
+        bias_m: Standard deviation of the error that all rays of one view have in common.
     """
     local = (points.at - T[:3, 3]) @ T[:3, :3]
     nearest, distance = surface.find_nearest(local)

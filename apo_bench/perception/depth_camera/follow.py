@@ -1,4 +1,4 @@
-"""Follow a demonstration from range image to range image: which part moved, and where to."""
+"""Follow a demonstration through its range images: detect which part each operation moved, and to which pose."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,56 +23,62 @@ from apo_bench.perception.depth_camera.regions import Regions, find_changed_regi
 from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
 
 _GONE = 0.5
-"""A part has moved if so much of what was observed of it has vanished."""
+"""A part has moved if at least this fraction of its visible pixels has vanished."""
 _GRID = 3
-"""Every so many pixels are looked up."""
+"""Every third pixel of every third row is looked up."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Event:
-    """One operation as the range finder saw it."""
+    """One operation as measured by the range finder."""
 
     first: int
-    """Number of the image before it."""
+    """Index of the image before it."""
     last: int
-    """Number of the image after it."""
+    """Index of the image after it."""
     regions: tuple[Regions, ...]
-    """Per view."""
+    """Changed regions per view."""
     moved: frozenset[str]
-    """The parts that are gone from where they were."""
+    """The parts that left their place."""
     explained: Mapping[str, float]
-    """How much of what appeared each model explains."""
+    """Name of a model -> fraction of the change that it explains, 0 to 1."""
     found: LocatedModel | None
-    """Where the main part is now; None if nothing was recognised."""
+    """The main part at its new pose; None if it was not recognised."""
     model: Model | None
-    """What was fitted; None if it is not known what moved."""
+    """The fitted model of the moved parts; None if no expected operation moves these parts."""
     operation: int | None
-    """Which operation this was, counted from 0; None if none that was expected."""
+    """The operation, counted from 0; None if no expected operation moves these parts."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What is known before looking: topology, models, where parts start, and roughly how they will be turned."""
+    """Prior knowledge of the sensor: topology, part models, start poses and planned rotations."""
 
     assembly: Assembly
     start: Poses
     turns: Array
-    """(n, 3, 3), the planned rotation of each pose, world; the turn of the whole is learnt from the first part."""
+    """(n, 3, 3), planned rotation of each target pose; a common rotation is estimated from the first located part."""
     play_m: float = 0.0
-    """Clearance per side: the models are the parts as they are made."""
+    """Clearance per side, by which the models are smaller, like the parts that are made."""
 
 
 def follow_demonstration(
     images: Sequence[Array], level_m: float, expected: Expected, cast: RayCaster
 ) -> tuple[Event, ...]:
-    """Find every operation in range images, one per quiet spell, each (views, height, width), [m]; the first is before.
+    """Detect the operations in range images and locate the part that each one moved.
 
-    An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
-    what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
-    this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
-    pause of the hand looks the same as the end of an operation, so the others are not observed.
+    An operation ends at the last image before different parts move, so that the hand may pause in between. Only
+    manipulated parts are located: other parts that moved by less than a pixel or two keep their pose. Of consecutive
+    operations that move the same parts only the last is observed, since a pause of the hand looks like an end.
+
+    Args:
+        images: (views, height, width) each, measured distances, [m]: before the demonstration, then one per pause.
+        level_m: Standard deviation of one ray.
+
+    Returns:
+        One event per detected operation, in order.
     """
     assembly = expected.assembly
     believed = {part: expected.start[part] for part in assembly.solids}
@@ -97,6 +103,7 @@ def follow_demonstration(
         if which is not None and located is not None:
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
+            # Of the poses that look the same, report the one nearest to the planned rotation.
             turn = frame @ expected.turns[which]
             T = find_least_turned(solid, find_nearest_symmetric_pose(located.T, find_symmetries(solid), turn), turn)
             if not any(event.found for event in events):
@@ -118,10 +125,18 @@ def _spell(
     k: int,
     owners: Sequence[NDArray[np.int64]],
 ) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
-    """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
+    """Find the image at which the next operation ended.
 
-    Operation k is looked for first; one that moves something else may come instead, if k was not observed. Of
-    consecutive operations that move the same parts it is the last, since the spell ends when something else moves.
+    Operation k is expected; a later one is accepted if its parts moved. Of consecutive operations that move the same
+    parts the last is returned.
+
+    Args:
+        first: Index of the image before the operation.
+        owners: Per view, which part each looked-up pixel should show, see `_find_owners`.
+
+    Returns:
+        Index of the image, operation (None if no expected one moves these parts), changed regions per view, and moved
+        parts; None if nothing moved.
     """
     spell = None
     for last in range(first + 1, len(images)):
@@ -142,7 +157,13 @@ def _spell(
 def _find_gone(
     owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]
 ) -> frozenset[str]:
-    """The parts of whose visible surface most has vanished."""
+    """The parts most of whose visible pixels have vanished.
+
+    Args:
+        owners: Per view, index of the part that each looked-up pixel should show, -1 for none.
+        parts: Names, in the order of the indices.
+        compared: Changed regions per view.
+    """
     owner = np.array(owners)
     vanished = np.array([region.vanished[::_GRID, ::_GRID] for region in compared])
     seen = np.bincount(owner[owner >= 0], minlength=len(parts))
@@ -151,7 +172,7 @@ def _find_gone(
 
 
 def _find_owners(view: PinholeView, believed: Poses, cast: RayCaster) -> NDArray[np.int64]:
-    """Which part every few pixels of a view should show, by number, -1 for none."""
+    """The index of the part that every third pixel of every third row should show, -1 for none."""
     pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::_GRID, ::_GRID]
     _, owner = cast(believed, view.origin, view.rays[pixels.ravel()])
     return owner.reshape(pixels.shape)
@@ -164,7 +185,16 @@ def _find_model(
     which: int | None,
     appearance: Appearance,
 ) -> tuple[Mapping[str, float], LocatedModel | None]:
-    """How much each model explains, and where the one that moved is, if none explains more."""
+    """Fit the moved parts and, for comparison, each other part of a different shape.
+
+    Args:
+        group: The model of the moved parts; None if the operation is unknown.
+        which: The operation, counted from 0, or None.
+
+    Returns:
+        Name of a model -> fraction of the change that it explains; and the located model, None if it was not
+        recognised or another model explains clearly more.
+    """
     assembly = expected.assembly
     points = appearance.points()
     shares: dict[str, float] = {}
@@ -185,11 +215,12 @@ def _find_model(
 
 
 def _model_alone(assembly: Assembly, surfaces: Mapping[str, Surface], part: str) -> Model:
+    """The model of a single part."""
     return Model({part: np.eye(4)}, surfaces[part], find_symmetries(assembly.solids[part]))
 
 
 def _moving_model(assembly: Assembly, surfaces: Mapping[str, Surface], believed: Poses, which: int) -> Model:
-    """What an operation moves, as one rigid thing."""
+    """The model of all parts that an operation moves, as one rigid body at their estimated relative poses."""
     operation = assembly.operations[which]
     if not operation.carries:
         return _model_alone(assembly, surfaces, operation.main)
@@ -201,6 +232,6 @@ def _moving_model(assembly: Assembly, surfaces: Mapping[str, Surface], believed:
 
 
 def _turn_covariance(located: LocatedModel, T: Array) -> Array:
-    """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
+    """The covariance (6, 6) for the symmetric pose T instead of `located.T`: body twists become S^-1 xi S."""
     A = pose.adjoint(pose.inverse(T) @ located.T)
     return np.asarray(A @ located.covariance @ A.T)

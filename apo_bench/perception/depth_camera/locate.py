@@ -1,4 +1,4 @@
-"""Locate what appeared: fit every model, and keep the one that explains most."""
+"""Locate a model in the region that appeared: fit from many start poses, and keep the pose that explains most."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,60 +17,65 @@ from apo_bench.perception.depth_camera.starts import guess_poses
 from apo_bench.perception.depth_camera.surface import Surface
 
 _COARSE = 150
+"""Points of the first fit, from every start pose."""
 _MIDDLE = 500
+"""Points of the second fit, from the best results."""
 _FINE = 3000
-"""Points of a first fit from every start, of the best of these, and of the last fit."""
+"""Points of the last fit."""
 _BEST = 4
-"""Starts that are followed further: one fit in some ends off the true place, so never only one."""
+"""Results of the first fit that are refined; more than one, since some fits end in a wrong minimum."""
 _WIDTH_M = 0.0015
-"""Points this far away from a surface are half doubted; three standard deviations if that is more."""
+"""Width of the last fit, unless three standard deviations of a ray are more; see `refine_fit`."""
 _WELL_SEEN = copy_frozen([0.001] * 3 + [np.radians(1.0)] * 3, 6)
-"""A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
+"""If the standard deviations of the main part alone are smaller, the parts that it carries are ignored, [m, rad]."""
 _WIDE_M = 0.012
-"""The width at which a fit begins; it is narrowed from there, so that no end of a part is left behind."""
+"""Width of the first fit; wide, so that points at the ends of a part count."""
 _LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03
-"""What explains less than the best by no more than this may be the right one."""
+"""A model that explains less than the best one by no more than this may still be the right one."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A part, or several that move as one, as the range finder looks for them."""
+    """A rigid model that the range finder searches for: one part, or a main part with the parts that it carries."""
 
     parts: Mapping[str, Array]
-    """The main part and others, with their poses (4, 4) in its frame."""
+    """Main and carried parts -> pose (4, 4) in the frame of the main part."""
     surface: Surface
-    """In the frame of its main part."""
+    """Of all parts, in the frame of the main part."""
     same: Array
-    """(m, 4, 4), displacements after which it looks the same; the identity first."""
+    """(m, 4, 4), symmetries: displacements that leave its shape unchanged; the identity first."""
     main: Surface | None = None
-    """That of the main part alone, if it carries others."""
+    """Surface of the main part alone, if it carries others."""
     carried: Surface | None = None
-    """That of the others."""
+    """Surface of the carried parts, if there are any."""
 
     def put(self, T: Array) -> Mapping[str, Array]:
-        """Where the parts are, if the model is at T, (4, 4), world."""
+        """The poses of the parts, world, if the main part is at T, (4, 4)."""
         return {part: T @ offset for part, offset in self.parts.items()}
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Appearance:
-    """What appeared between two firings."""
+    """The surfaces that appeared between two range images."""
 
     views: Sequence[PinholeView]
     images: Array
     """(views, height, width), the later images, [m]."""
     masks: Sequence[Mask]
-    """Per view, where something is nearer than before."""
+    """Per view, pixels that are nearer than before."""
     noise_m: float
+    """Standard deviation of the independent error of a ray."""
     bias_m: float
+    """Standard deviation of the error that all rays of one view have in common."""
     cast: RayCaster
+    """Casts rays at the models of the parts."""
 
     def points(self) -> Points:
-        """The measured points; the outermost pixels of the regions are left out."""
+        """The measured points in the masks, without the outermost pixels of each region."""
         from scipy.ndimage import binary_erosion
 
         points: list[Points] = []
@@ -82,34 +87,35 @@ class Appearance:
 
     @cached_property
     def smooth(self) -> Array:
-        """The images with less noise, edges kept; NaN around what is missing."""
+        """The images after an edge-preserving median filter; NaN around missing readings."""
         return np.array([filter_median(image) for image in self.images])
 
     @property
     def width_m(self) -> float:
+        """Width of the last fit, [m]."""
         return max(_WIDTH_M, 3.0 * self.noise_m)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class LocatedModel:
-    """A model where it was found."""
+    """The fitted pose of a model."""
 
     T: Array
-    """(4, 4), of the frame of the model, world, [m]; one of those that look the same."""
+    """(4, 4), pose of the main part, world, [m]; of a symmetric part any one of the equivalent poses."""
     covariance: Array
-    """(6, 6), of the body twist by which it is wrong, [m, rad]."""
+    """(6, 6), covariance of the body twist of its error, [m, rad]."""
     explained: float
-    """0 to 1."""
+    """Fraction of the change that it explains, 0 to 1."""
 
 
 def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel | None:
-    """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
+    """Fit a model to the points that appeared; None if they are too few, or if the model does not explain them.
 
-    A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
-    the last fit is that of the main part alone, if enough of it is visible.
+    A main part is first located together with the parts that it carries, as one rigid body. Carried parts may have
+    shifted in the hand, so the last fit uses the main part alone, if enough of it is visible.
     """
-    if len(points) < 6:
+    if len(points) < 6:  # a pose has six unknowns
         return None
     best, _ = _best(model, appearance, points)
     T, C = _fine(model.surface, appearance, points.thinned(_FINE), best)
@@ -120,6 +126,7 @@ def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel
         local = (points.at - T[:3, 3]) @ T[:3, :3]
         _, far = model.main.find_nearest(local)
         _, others = model.carried.find_nearest(local)
+        # Points of the main part: near to it, and nearer to it than to the carried parts.
         own = points.only((far < 2.0 * appearance.width_m) & (far < others))
         if len(own) >= 6:
             alone = _fine(model.main, appearance, own.thinned(_FINE), T)
@@ -129,20 +136,20 @@ def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel
 
 
 def compare_models(models: Mapping[str, Model], appearance: Appearance, points: Points) -> Mapping[str, float]:
-    """How much of what appeared each model explains where it fits best, 0 to 1."""
+    """Name of a model -> fraction of the change, 0 to 1, that it explains at its best pose."""
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
     return {name: _best(model, appearance, points)[1] for name, model in models.items()}
 
 
 def _fine(surface: Surface, appearance: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
-    """The last fit, from a good start, and its covariance."""
+    """The last fit, from a good start pose T: the pose (4, 4) and its covariance (6, 6)."""
     T = refine_fit(surface, points, T[None], appearance.width_m, 20).T[0]
     return T, covariance(surface, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
 
 
 def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
-    """The best few of the fits from all starts."""
+    """Fit from all start poses with few points, then refine the best `_BEST` with narrower widths."""
     surface = model.surface
     wide = max(_WIDE_M, 3.0 * appearance.width_m)
     first = refine_fit(surface, points.thinned(_COARSE), guess_poses(surface.corners, points.at, model.same), wide, 10)
@@ -153,7 +160,7 @@ def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
 
 
 def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, float]:
-    """The pose (4, 4) that explains most, and how much, judged together with how close it is."""
+    """The best pose (4, 4), by explained fraction less cost of the fit, and its explained fraction."""
     fits = _coarse(model, appearance, points)
     shares = np.array([_share(model, appearance, T) for T in fits.T])
     best = int(np.argmax(shares - fits.cost))
@@ -161,5 +168,6 @@ def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, 
 
 
 def _share(model: Model, appearance: Appearance, T: Array) -> float:
+    """The fraction of the change that the model explains at pose T."""
     seen = appearance
     return measure_share(model.put(T), seen.cast, seen.views, seen.smooth, seen.masks, seen.noise_m)

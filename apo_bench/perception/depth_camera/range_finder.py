@@ -1,4 +1,4 @@
-"""The range finder: pinhole views, and the errors of its sensor."""
+"""The simulated range finder: its two pinhole views and its measurement errors."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,22 +12,24 @@ from apo_bench.geometry import Array, copy_frozen, pose
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
 BIAS = 0.1
-"""Standard deviation, over the level, of an error that all rays of one view and firing have in common: white noise
-averages out over a part, so this is what stays; a tenth, as repeated measurements of a fixed object differ by 0.1 to
-0.3 mm where one ray is good to a millimetre or two."""
+"""Standard deviation of the error that all rays of one view and image have in common, relative to that of one ray.
+
+White noise averages out over a part, so this error remains. A tenth, since repeated measurements of a fixed object
+differ by 0.1 to 0.3 mm where one ray is good to a millimetre or two.
+"""
 _GRAZING_DEG = 80.0
-"""Surfaces that are seen more obliquely send nothing back."""
+"""Surfaces hit at a larger angle to their normal give no reading."""
 _DROPOUTS = 0.01
-"""Share of rays without an answer, at random."""
+"""Fraction of rays without a reading, at random."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PinholeView:
-    """A pinhole camera: its pose, and how it divides its picture into pixels."""
+    """A pinhole camera: pose, size of the image in pixels and opening angle."""
 
     T_world_view: Array
-    """(4, 4), [m]; x to the right of the picture, y down, z along the optical axis."""
+    """(4, 4), [m]; x to the right of the image, y down, z along the optical axis."""
     width: int
     height: int
     fov_deg: float
@@ -38,13 +40,13 @@ class PinholeView:
 
     @property
     def origin(self) -> Array:
-        """Where all rays begin, (3,), world, [m]."""
+        """The common origin of all rays, (3,), world, [m]."""
         return self.T_world_view[:3, 3]
 
     @cached_property
     def rays(self) -> Array:
         """Unit vectors through the middles of the pixels, row by row, (height * width, 3), world."""
-        # A pixel at (u, v) looks along (u - middle, v - middle, focal), focal the distance of the picture in pixels.
+        # The ray of pixel (u, v) is (u - middle, v - middle, focal), with the focal length in pixels.
         focal = self.height / 2 / np.tan(np.radians(self.fov_deg) / 2)
         v, u = np.mgrid[: self.height, : self.width]
         x = (u + 0.5 - self.width / 2) / focal
@@ -54,16 +56,16 @@ class PinholeView:
 
 
 class RangeImage(NamedTuple):
-    """One firing without any error: true distances, (views, height, width)."""
+    """Range images of all views at one time, without errors."""
 
     distance: Array
-    """Along the ray, [m]; infinite where nothing is."""
+    """(views, height, width), true distance along each ray, [m]; infinite if the ray hits nothing."""
     cosine: Array
-    """The cosine of the angle between the ray and the normal of what it strikes, 0 (grazing) to 1."""
+    """(views, height, width), cosine of the angle between the ray and the normal of the surface, 0 (grazing) to 1."""
 
 
 def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
-    """The pose (4, 4) of a camera that stands at a point, looks at another and holds its picture upright, [m]."""
+    """The pose (4, 4) of a camera at `from_m` whose optical axis points to `at_m`, with an upright image, [m]."""
     origin = np.asarray(from_m, dtype=np.float64)
     at = np.asarray(at_m, dtype=np.float64)
     z = (at - origin) / np.linalg.norm(at - origin)
@@ -73,6 +75,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
 
 
 def _two_views() -> tuple[PinholeView, ...]:
+    """Two cameras on opposite sides of the viewed point, 400 x 300 pixels, opening angle 48 degrees."""
     reach = 0.67
     height_m = 0.67
     at = np.array(VIEWED_POINT_M)
@@ -81,20 +84,20 @@ def _two_views() -> tuple[PinholeView, ...]:
 
 
 VIEWS = _two_views()
-"""From the left in front and from the right behind, 45 degrees high: together they cover every side of a part.
+"""Two opposite views, 45 degrees above the table: together they cover every side of a part.
 
-One view is not enough: of a stick that lies in a tower only its ends are visible, and only one of them from either
-side. At 0.95 m a pixel is 3 mm wide.
+One view is not enough: of a stick in a tower only the two ends are visible, each from one side only. At 0.95 m a pixel
+is 3 mm wide.
 """
 
 
 def sense(image: RangeImage, level_m: float, rng: np.random.Generator) -> Array:
-    """Measure true distances with errors.
+    """Add measurement errors and dropouts to true distances.
 
-    Unit draws are scaled by the level, so the same generator gives comparable errors at all levels.
+    Unit draws are scaled by the noise level, so equal seeds give proportional errors at all levels.
 
     Args:
-        level_m: Standard deviation of a ray.
+        level_m: Standard deviation of one ray.
 
     Returns:
         (views, height, width), [m]; NaN where the sensor has no reading.

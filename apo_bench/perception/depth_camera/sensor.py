@@ -1,4 +1,4 @@
-"""The range finder as a sensor of poses: range images in, an observation out."""
+"""The range finder as a pose source: turns range images of a demonstration into an observation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,29 +14,29 @@ from apo_bench.perception.depth_camera.rays import MakeRayCaster
 from apo_bench.perception.observation.models import floor_covariance
 
 _UNSEEN = copy_frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
-"""The covariance of an operation that was not observed, [m, rad]."""
+"""The stated covariance of an operation that was not observed, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class RangeSensor:
-    """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
+    """A pose source with the signature of a noise model, `(assembly, shown, rng) -> Observation`.
 
-    Of the demonstration it uses only the topology, the start poses and the covariance of the human error; poses are
-    fitted to range images. Where a part looks the same when turned, the turn nearest to the planned one is reported,
-    and nothing else is taken from the plan.
+    It fits poses to range images. Of the demonstration it uses only the topology, the start poses and the covariance of
+    the human error. For a symmetric part it reports the equivalent pose nearest to the planned rotation; it takes
+    nothing else from the plan.
     """
 
     images: tuple[RangeImage, ...]
-    """Without error: before the demonstration and in every quiet spell."""
+    """Range images without errors: before the demonstration, then one per pause of the hand."""
     level_m: float
-    """Standard deviation of a ray."""
+    """Standard deviation of one ray."""
     turns: Array
     """(n, 3, 3), the planned rotation of each target pose, world."""
     play_m: float
-    """Clearance per side, as the models are those of the parts as they are made."""
+    """Clearance per side, by which the models are smaller, like the parts that are made."""
     make_caster: MakeRayCaster
-    """What casts rays at these models."""
+    """Makes the ray caster for these models."""
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         events = self.events(demonstration, self.sensed(rng))
@@ -58,11 +58,11 @@ class RangeSensor:
         )
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:
-        """The images with the errors of the sensor, (views, height, width) each, [m]."""
+        """The images with measurement errors, (views, height, width) each, [m]."""
         return [sense(image, self.level_m, rng) for image in self.images]
 
     def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
-        """What the sensor makes of measured images, operation by operation."""
+        """The operations that the sensor detects in measured images, (views, height, width) each, [m]."""
         assembly = demonstration.assembly
         expected = Expected(assembly, demonstration.start, self.turns, self.play_m)
         cast = self.make_caster(assembly.solids, self.play_m)

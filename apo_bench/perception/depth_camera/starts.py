@@ -1,25 +1,26 @@
-"""Start poses of a fit: the ways in which a part that stands on a table may have the measured points."""
+"""Start poses of a fit: the poses of a part on a table whose bounding box matches that of the measured points."""
 
 import numpy as np
 
 from apo_bench.geometry import Array, list_quarter_turns
 
 _EDGE = 0.01
-"""Share of the points beyond either end of their extent: noise makes regions larger than parts."""
+"""Fraction of the points ignored at either end of their extent, since noise makes regions larger than parts."""
 _STEPS = 45
-"""Directions between 0 and 90 degrees that are tried for the sides of the smallest rectangle."""
+"""Number of directions, 0 to 90 degrees, that are tried for the sides of the smallest rectangle."""
 
 
 def guess_poses(corners: Array, points: Array, same: Array) -> Array:
-    """Poses (s, 4, 4) of a shape whose visible surface may be the points (n, 3), world, [m].
+    """Start poses (s, 4, 4), world, [m], for the fit of a shape to measured points.
 
-    The smallest rectangle around the points, seen from above, says how the sides of a part that stands on one of its
-    sides are turned; of the 24 ways to put a box on a table those that look the same are tried once. The part is put in
-    the middle of the rectangle, and as high as the points reach.
+    The smallest rectangle around the points, in the top view, gives the rotation about the vertical. Of the 24
+    orientations of a box, those that symmetries make equal are tried once. The shape is centred in the rectangle, with
+    its top at the top of the points.
 
     Args:
-        corners: (k, 3), of the shape, in its own frame.
-        same: (m, 4, 4), displacements after which the shape looks the same.
+        corners: (k, 3), of the shape, in its own frame, [m].
+        points: (n, 3), world, [m].
+        same: (m, 4, 4), symmetries of the shape.
     """
     turn = _find_sides(points[:, :2])
     c = np.cos(turn)
@@ -37,7 +38,12 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
 
 
 def keep_distinct(turns: Array, same: Array) -> Array:
-    """Rotations without repetition: one, (3, 3), of each set in (k, 3, 3) that symmetries make equal."""
+    """Keep one rotation of each set that the symmetries make equal.
+
+    Args:
+        turns: (k, 3, 3).
+        same: (m, 4, 4), symmetries of the shape.
+    """
     kept: list[Array] = []
     for R in turns:
         if not any((np.abs(K @ same[:, :3, :3] - R).max(axis=(1, 2)) < 1e-9).any() for K in kept):
@@ -46,7 +52,7 @@ def keep_distinct(turns: Array, same: Array) -> Array:
 
 
 def _find_sides(flat: Array) -> float:
-    """The turn, 0 to 90 degrees, of the smallest rectangle around points (n, 2), [rad]."""
+    """The rotation of the rectangle of least area around points (n, 2), 0 to pi/2, [rad]."""
     turns = np.arange(_STEPS) * np.pi / 2 / _STEPS
     ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     across = np.stack([-np.sin(turns), np.cos(turns)], axis=1)

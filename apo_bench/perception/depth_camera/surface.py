@@ -1,4 +1,4 @@
-"""The surface of a part as a cloud of points for small_gicp."""
+"""The surface of a part as a point cloud with normals, for the fits of small_gicp."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,10 +12,11 @@ from apo_bench.errors import missing_package
 from apo_bench.geometry import Array, Piece, build_union_mesh, collect_corners, pose
 
 _SPACING_M = 0.001
-"""Between points, on average."""
+"""Mean distance between points."""
 _MOST_POINTS = 60_000
+"""Points of one surface, at most."""
 _NEIGHBOURS = 8
-"""So many points say which way the surface looks."""
+"""Points from which small_gicp estimates a normal."""
 
 
 @final
@@ -28,11 +29,11 @@ class Surface:
     normals: Array
     """(n, 3), unit vectors out of the part."""
     corners: Array
-    """(k, 3), of all convex pieces."""
+    """(k, 3), corners of all convex pieces."""
 
     @cached_property
     def cloud(self) -> Any:
-        """The points as small_gicp has them, with its own normals, which are round at edges."""
+        """The point cloud of small_gicp, with the normals that it estimates, which are rounded at edges."""
         gicp = load_small_gicp()
         cloud = gicp.PointCloud(self.points)
         gicp.estimate_normals(cloud, self.tree, _NEIGHBOURS, 1)
@@ -40,22 +41,22 @@ class Surface:
 
     @cached_property
     def tree(self) -> Any:
-        """What finds the nearest of the points."""
+        """The k-d tree of the points."""
         return load_small_gicp().KdTree(self.points)
 
     def find_nearest(self, points: Array) -> tuple[NDArray[np.int64], Array]:
-        """The number of the nearest point of the surface, and its distance, (m,) each, of points (m, 3)."""
+        """The index of the nearest surface point and its distance [m], (m,) each, for points (m, 3)."""
         number, squared = self.tree.batch_nearest_neighbor_search(points)
         return np.asarray(number, dtype=np.int64), np.sqrt(squared)
 
     def looks_like(self, other: "Surface") -> bool:
-        """Whether both are of parts of one shape."""
+        """True if both parts have the same corners, in the same order."""
         return self.corners.shape == other.corners.shape and np.allclose(self.corners, other.corners)
 
 
 @lru_cache(maxsize=64)
 def sample_surface(pieces: tuple[Piece, ...]) -> Surface:
-    """The surface of a union of pieces; the same pieces give the same points."""
+    """Sample the surface of a union of pieces; deterministic."""
     from trimesh.sample import sample_surface as sample
 
     mesh = build_union_mesh(pieces)
@@ -64,7 +65,7 @@ def sample_surface(pieces: tuple[Piece, ...]) -> Surface:
 
 
 def join_surfaces(posed: Iterable[tuple[Surface, Array]]) -> Surface:
-    """Surfaces that stand at poses (4, 4) as one."""
+    """Join surfaces at poses (4, 4) into one."""
     points, normals, corners = [], [], []
     for surface, T in posed:
         points.append(pose.apply(T, surface.points))
@@ -74,10 +75,10 @@ def join_surfaces(posed: Iterable[tuple[Surface, Array]]) -> Surface:
 
 
 def load_small_gicp() -> Any:
-    """The package that fits.
+    """Import the package small_gicp.
 
     Raises:
-        InputError: It is not installed.
+        InputError: The package is not installed.
     """
     try:
         import small_gicp

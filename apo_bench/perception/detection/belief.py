@@ -1,7 +1,6 @@
-"""A linear filter of all poses together, in which contacts are measurements.
+"""A Kalman filter over all poses together, in which each contact is a measurement.
 
-Contacts are without noise but for play, and are taken one after the other. The filter serves to tell which contacts go
-together; the correction itself is not its business.
+The detector uses it to judge which contacts are consistent with each other. The correction does not use it.
 """
 
 from collections.abc import Mapping
@@ -15,29 +14,34 @@ from apo_bench.geometry import Array, pose
 
 
 class PartBeliefs(NamedTuple):
-    """Every part after an operation."""
+    """Estimated poses of all parts after one operation, and how they depend on errors of the observed poses."""
 
     poses: Poses
     reach: Mapping[str, Array]
-    """Part -> (6, 6 n): the world twist (v, w), about the origin, that body twists of all poses make of its pose."""
+    """Part -> (6, 6 n), Jacobian of the world twist (v, w) of the part, about the world origin, by the body twists of
+    all n poses."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """Poses with one covariance over all of them; the assembly gives who moves and who is carried, no contact."""
+    """A Gaussian estimate of all poses, with one joint covariance.
+
+    The assembly states which parts an operation moves and carries; its contacts are not used.
+    """
 
     assembly: Assembly
     start: Poses
     poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array
-    """(6 n, 6 n), of the body twists by which the poses are wrong, [m, rad]."""
+    """(6 n, 6 n), covariance of the body twists of the pose errors, [m, rad]."""
 
     def standing(self, k: int) -> PartBeliefs:
-        """Where every part is after operation k, counted from 0, and what errors of the poses do to it.
+        """The poses of all parts after operation k, counted from 0, and their Jacobians by errors of the poses.
 
-        With D' = T D_m^-1 D_s of a carried part, and exp(w) D a displaced D: w' = Ad(T) xi + Ad(T D_m^-1) (w_s - w_m).
+        A carried part s at D_s, with the main part m moved from D_m to T, comes to D' = T D_m^-1 D_s. With exp(w) D a
+        displaced D, its Jacobian follows from w' = Ad(T) xi + Ad(T D_m^-1) (w_s - w_m).
         """
         n = len(self.poses)
         poses = dict(self.start)
@@ -55,10 +59,12 @@ class Belief:
         return PartBeliefs(poses, reach)
 
     def condition(self, e: Array, J: Array, noise: Array) -> "Belief":
-        """The belief after learning that some quantities, now e (r,) with derivative J (r, 6 n), are zero up to noise.
+        """The belief after a Kalman update with the measurement that a residual is zero up to noise.
 
         Args:
-            noise: (r, r), covariance of what the quantities really are.
+            e: (r,), the residual at the current poses.
+            J: (r, 6 n), derivative of the residual by the body twists of all poses.
+            noise: (r, r), covariance of the true residual.
         """
         # Kalman's update: K = P J^t (J P J^t + S)^-1, xi = -K e, P - K J P; symmetric again after rounding.
         PJ = self.covariance @ J.T
@@ -69,6 +75,6 @@ class Belief:
 
 
 def initial_belief(observation: Observation) -> Belief:
-    """What an observation says before any contact is known."""
+    """The belief before any contact: the observed poses and their stated joint covariance."""
     covariance = compute_joint_covariance(observation.poses, observation.covariance, observation.shared)
     return Belief(observation.assembly, observation.start, observation.poses, covariance)

@@ -1,4 +1,4 @@
-"""Candidates: pairs of faces that may touch, within the thresholds of the noise."""
+"""Candidates: pairs of faces whose gap and angle the noise can explain, so that they may touch."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -10,46 +10,48 @@ from apo_bench.geometry import Array
 from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
 
 _IMPLIED = 1.0
-"""A contact that gains less by closing, in twice the logarithm, closes anyway if those before do."""
+"""A candidate with a smaller `gain` is implied by the contacts already taken."""
 
 
 class Candidate(NamedTuple):
-    """A pair of faces that may touch."""
+    """A pair of faces that may touch, with the statistics of the decision."""
 
     contact: Contact
     pair: FacingPair
+    """Measured gap and tilts at the current poses."""
     slope: Array
-    """(r, 6 n): derivative of its residual by body twists of all poses; r is 3 of flat faces."""
+    """(r, 6 n): derivative of its residual by body twists of all poses; r is 3 for flat faces."""
     noise: Array
-    """(r, r): see `reality`."""
+    """(r, r): covariance of the residual of a true contact, see `reality`."""
     most: PairThresholds
+    """Largest gap and angle that the noise explains."""
     distance: float
     """Squared Mahalanobis length of its residual."""
     gain: float
-    """Twice the logarithm of how much likelier a closed pair is than one anywhere in the range that is left."""
+    """Twice the log-likelihood ratio of a closed pair to one anywhere in the range that the other contacts leave."""
     deviation_m: float
-    """Of its gap."""
+    """Standard deviation of its gap."""
     normal: Array
-    """Of the environment face, (3,), world; zero of round faces."""
+    """Normal of the environment face, (3,), world; zero for round faces."""
 
     @property
     def implied(self) -> bool:
-        """Whether it is no choice: where the contacts hold that were taken before, these faces touch."""
+        """True if the contacts taken before already make these faces touch, so there is nothing to decide."""
         return self.gain < _IMPLIED
 
     @property
     def parts(self) -> tuple[str, str]:
-        """Manipulated, environment."""
+        """Names of the manipulated and of the environment part."""
         return self.contact.manipulated.part, self.contact.environment.part
 
 
 def judge_pair(
     seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: FacingPair, slope: Array, C: Array
 ) -> Candidate | None:
-    """A pair of faces of parts a and b as a candidate that gains nothing yet; None beyond the thresholds.
+    """Make a candidate, with gain 0, of a pair of faces of parts a and b; None if it exceeds the thresholds.
 
     Args:
-        T_b: Where part b is, (4, 4), world, [m].
+        T_b: (4, 4), pose of part b, world, [m].
         slope: (r, 6 n): derivative of the residual by body twists of all poses.
         C: (r, r): covariance of the residual, from the poses alone.
     """
@@ -59,7 +61,7 @@ def judge_pair(
     most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
     if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
         return None
-    # Squared Mahalanobis length: C is of the poses, noise of play and softness of a contact that is there.
+    # Squared Mahalanobis length: C comes from the poses, noise from the play and softness of a true contact.
     distance = float(pair.residual @ np.linalg.solve(C + noise, pair.residual))
     is_flat = not seen.assembly.is_round(contact)
     normal = T_b[:3, :3] @ seen.assembly.face(contact.environment).normal if is_flat else np.zeros(3)

@@ -1,11 +1,11 @@
 """Detect which face touches which, from solids, observed poses and their stated noise (Section 1, first half).
 
-Operation by operation, faces of the parts that moved are held against faces of the parts that stand there. A pair is a
+For each operation, the detector compares faces of the moved parts with faces of the parts already in place. A pair is a
 candidate if its normals are opposite within an angle, its gap is small and its overlap large enough. Noise moves whole
-parts, so the contacts of an operation are not judged one by one: the likeliest is taken, the poses are put where
-that one closes, and the others are looked at from there. Where that leaves candidates over, other beginnings are tried
-and the likeliest set wins (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the
-joint compatibility test", 2001).
+parts, so the contacts of an operation are not judged independently. The detector takes the likeliest candidate, updates
+the poses as if it closed, and measures the others again. If candidates remain, it also tries other first candidates and
+keeps the likeliest set (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the joint
+compatibility test", 2001).
 """
 
 from collections.abc import Collection, Iterator
@@ -30,7 +30,7 @@ from apo_bench.perception.detection.evidence import (
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
 
 _BEGINNINGS = 12
-"""Candidates that are tried as the first of an operation, at most."""
+"""At most so many candidates are tried as the first contact of an operation."""
 
 
 @check_arguments
@@ -68,27 +68,32 @@ def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> 
 
 
 class _Found(NamedTuple):
-    """Contacts that go together."""
+    """A set of jointly compatible contacts of one operation."""
 
     taken: tuple[Candidate, ...]
+    """In the order in which they were taken."""
     belief: Belief
+    """The poses after all taken contacts."""
     score: float
-    """Sum of the squared lengths, less what each equation that was not implied gains by closing: see `_gain`."""
+    """Sum over the taken contacts of squared Mahalanobis length less gain (see `_gain`); lower is better."""
     left: tuple[Contact, ...]
-    """Candidates at the beginning that were not taken."""
+    """Candidates before the first contact that were not taken."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Around:
-    """One operation and what stands around it."""
+    """One operation and the parts around it: searches the likeliest set of contacts."""
 
     seen: Observation
     rules: Rules
     k: int
+    """The operation, counted from 0."""
     others: tuple[str, ...]
+    """Parts in place that the operation does not move."""
 
     def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[Candidate, ...]:
         """The pairs within the thresholds that were not taken yet, the likeliest first."""
+        # Squared lengths are compared per residual, scaled to the 3 residuals of flat faces.
         now = belief.standing(self.k)
         solids = self.seen.assembly.solids
         rules = self.rules
@@ -102,7 +107,7 @@ class _Around:
         return tuple(sorted(candidates, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
 
     def likeliest(self, belief: Belief) -> _Found:
-        """The contacts that go together: of all beginnings, the set with the least score."""
+        """The set of contacts with the lowest score, over all first candidates that are tried."""
         best = self._follow(belief, None)
         for first in best.left[:_BEGINNINGS]:
             other = self._follow(belief, first)
@@ -111,7 +116,11 @@ class _Around:
         return best
 
     def _follow(self, belief: Belief, first: Contact | None) -> _Found:
-        """Take the likeliest candidate (or a given one), put the poses where it closes, and look again."""
+        """Take candidates one by one, the likeliest first, and update the poses after each.
+
+        Args:
+            first: The contact to take first; None: the likeliest.
+        """
         at_first = at_hand = self.candidates(belief)
         taken = list[Candidate]()
         total = 0.0
@@ -127,7 +136,7 @@ class _Around:
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
     def _judged(self, a: str, b: str, pair: FacingPair, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
-        """The pair as a candidate, if it is one."""
+        """Yield the pair as a candidate; nothing if it exceeds the thresholds or depends on an unobserved pose."""
         # Body twists of all poses -> world twist of part a relative to part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.observed].any():
@@ -139,13 +148,18 @@ class _Around:
 
 
 def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
-    """What a pair that closes gains, before its squared length is taken off.
+    """Twice the log-likelihood ratio of a closed pair to one anywhere within the bounds, for a zero residual.
 
-    Along every axis in which the poses leave it uncertain, (range)^2 / (2 pi variance), the range being that within
-    the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
+    The sum of log((range)^2 / (2 pi variance)) over the independent axes of the residual, negative terms left out.
+    An axis that earlier contacts already fix gains nothing.
+
+    Args:
+        C: (r, r), covariance of the residual from the poses.
+        noise: (r, r), covariance of the residual of a true contact.
+        lengths: How many of the r rows are lengths; the others are angles.
     """
-    # Scaled by the range, eigenvectors of C are axes that are independent; an axis along which poses are no less sure
-    # than contacts are exact was decided before.
+    # After scaling by the range, the eigenvectors of C are independent axes. An axis along which the poses are at least
+    # as certain as a contact is exact was decided by earlier contacts.
     span = np.array([2 * rules.gap_m] * lengths + [2 * rules.angle_rad] * (len(C) - lengths))
     variance, V = np.linalg.eigh(C / np.outer(span, span))
     real = np.einsum("ij,ik,kj->j", V, noise / np.outer(span, span), V)

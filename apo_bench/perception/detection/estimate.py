@@ -1,14 +1,14 @@
-"""Estimate poses under a set of contacts, and how likely that set is.
+"""Estimate poses under a hypothetical set of contacts, and the Bayes factor of that set.
 
-Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a range that is
-much wider than the noise. What contacts leave at the observation, r = J xi - e, has the covariance J C J^t + S in the
-first case and J (C + R) J^t + S in the second, with C the noise, R the range and S what play and soft contacts add. The
+If the contacts hold, the observation is Gaussian about the contact manifold. If not, parts lie anywhere in a range much
+wider than the noise. The contact residual of the observation, r = J xi - e, has the covariance J C J^t + S in the first
+case and J (C + R) J^t + S in the second. C is the noise, R the range and S the effect of play and soft contacts. The
 set explains the observation better than chance by
 
     log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
 
 twice the logarithm of a Bayes factor (of Savage and Dickey; the range is so wide that its size alone counts). Equations
-that others imply add equally to both determinants, so they gain nothing, as they should.
+that others imply add equally to both determinants, so they gain nothing.
 """
 
 from dataclasses import dataclass
@@ -29,38 +29,39 @@ from apo_bench.geometry import Array, compute_right_jacobian, copy_frozen, pose
 from apo_bench.perception.detection.thresholds import CONTACT_SOFT_M
 
 _ROOM = copy_frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
-"""(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
+"""(6,): standard deviation of the pose of a part near others that it does not touch, [m, rad]."""
 _CARRIED = 3.0
-"""So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
+"""A contact of an operation that carries parts is off by the sum of so many independent plays."""
 _TURNS = 6
+"""Gauss-Newton steps at most."""
 _SMALL = 1e-5
-"""Steps of Gauss and Newton at most; they end when no pose moves by more, [m, rad]."""
+"""The steps end when no component of a pose changes by more, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """The likeliest poses of the first operations if some contacts hold."""
+    """The likeliest poses of the first n operations under the assumption that some contacts hold."""
 
     assembly: Assembly
     """The first n operations, with these contacts."""
     poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array
-    """(6 n, 6 n), of the body twists by which they are wrong, [m, rad]."""
+    """(6 n, 6 n), covariance of the body twists of their errors, [m, rad]."""
     room: Array
-    """(6 n, 6 n), the same if nothing had been observed but the contacts."""
+    """(6 n, 6 n), the same for parts that lie anywhere in the range about the observation, with the contacts closed."""
     badness: float
-    """-2 log of the Bayes factor of the contacts against none."""
+    """-2 log of the Bayes factor of the contacts against no contacts; lower is better."""
 
 
 def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimate:
-    """Solve for poses and contacts together.
+    """Compute the maximum a posteriori poses of the first n operations, given their contacts, by Gauss-Newton steps.
 
     Args:
-        seen: What was observed; its contacts do not matter.
-        assembly: Its first n operations, with the contacts that are supposed.
-        begin: (n, 4, 4), poses to begin with.
+        seen: The observation; its own contacts are ignored.
+        assembly: Its first n operations, with the hypothetical contacts.
+        begin: (n, 4, 4), initial poses, world, [m].
     """
     n = len(begin)
     C = compute_joint_covariance(seen.poses, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
@@ -85,14 +86,21 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimat
         poses = seen.poses[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
-    # |A| and |B| are what contacts leave with the noise and in the range: see the head of this file.
+    # A and B are the covariances of the contact residual with and without the contacts: see the module docstring.
     B = J @ room @ J.T + S
     badness = float(r @ np.linalg.solve(A, r) - (np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]))
     return PoseEstimate(assembly, poses, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
 
 
 def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
-    """What is uncertain of poses once equations hold, as body twists at these poses."""
+    """The covariance of poses after conditioning on contact equations, (6 n, 6 n), as body twists at these poses.
+
+    Args:
+        C: (6 n, 6 n), covariance before, of body twists xi at the observed poses.
+        J: (m, 6 n), derivative of the equations by xi.
+        A: (m, m), J C J^t + S.
+        Jr: (n, 6, 6), right Jacobians, from xi to body twists at the estimated poses.
+    """
     n = len(Jr)
     JC = J @ C
     left = C - JC.T @ np.linalg.solve(A, JC)
@@ -101,7 +109,11 @@ def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
 
 
 def _softness(assembly: Assembly, play_m: float) -> Array:
-    """(m, m): covariance of all equations of contacts that are there, [m^2]; their vertices together are off as one."""
+    """The diagonal covariance (m, m) of the residuals of true contacts, from play and softness, [m^2].
+
+    The variance of each equation is multiplied by the number of equations of its contact, so that their mean has the
+    variance that a single equation would have.
+    """
     each = []
     flat = project_round_faces(assembly)
     for operation in flat.operations:

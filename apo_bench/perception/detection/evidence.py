@@ -1,4 +1,4 @@
-"""Detected contacts, with the evidence for each."""
+"""The result of contact detection: the detected contacts, with the measured evidence for each."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -11,49 +11,52 @@ from apo_bench.perception.detection.thresholds import PairThresholds
 @final
 @dataclass(frozen=True)
 class Evidence:
-    """The evidence for a contact: what was measured when it was taken, and what was allowed."""
+    """The evidence for one contact: the values measured when the detector took it, and the thresholds."""
 
     contact: Contact
     made: int
     """The operation that made it, counted from 0."""
     gap_m: float
-    """Above 0 apart, below 0 inside each other, where the contacts taken before put the parts."""
+    """Gap at the poses updated by the contacts taken before; positive if apart, negative if the parts overlap."""
     angle_rad: float
+    """Angle between one normal and the opposite of the other, or between the axes of round faces."""
     share: float
-    """Overlap over the smaller face."""
+    """Overlap as a fraction of the smaller face."""
     most: PairThresholds
-    """The thresholds."""
+    """Largest gap and angle that were allowed."""
     seen_gap_m: float
-    """The gap at the poses as they were observed."""
+    """The gap at the observed poses."""
 
 
 class Rival(NamedTuple):
-    """The next best set of contacts, where several were compared."""
+    """The second best set of contacts, where several were compared."""
 
     assembly: Assembly
+    """The assembly with these contacts."""
     probability: float
+    """Posterior probability among the sets that were compared to the end."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class DetectedContacts:
-    """The assembly with the contacts that were detected, in all of which faces coincide."""
+    """The assembly with the detected contacts; in each contact the faces coincide, without a gap."""
 
     assembly: Assembly
     evidence: tuple[Evidence, ...]
     """One for each contact, in the order of `assembly.relations()`."""
     probability: float | None = None
-    """Of the set among those that were compared to the end; None where sets are not compared."""
+    """Posterior probability of the set among those compared to the end; None if the detector does not compare sets."""
     rival: Rival | None = None
 
 
 def without_contacts(observation: Observation) -> Observation:
-    """What was observed, with no contact of any operation."""
+    """The observation with all contacts and gaps removed."""
     return replace(observation, assembly=replace(keep_evident_contacts(observation.assembly, ()), gaps={}))
 
 
 def keep_evident_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
-    """The assembly whose operations make the contacts that the evidence is of, in its order."""
+    """The assembly with the contacts of the evidence as its only contacts, in the order of the evidence."""
     contacts: list[list[Contact]] = [[] for _ in assembly.operations]
     for each in evidence:
         contacts[each.made].append(each.contact)
@@ -67,15 +70,18 @@ def keep_evident_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> A
 def collect_evidence(
     assembly: Assembly, k: int, taken: Iterable[tuple[Contact, FacingPair, PairThresholds]], is_uncorrected: Poses
 ) -> list[Evidence]:
-    """What speaks for the contacts of operation k, in the order of parts and faces.
+    """The evidence for the contacts of operation k, sorted by part and face.
 
     Args:
-        as_seen: Where every part was observed after the operation, world, [m].
+        k: The operation, counted from 0.
+        taken: For each contact the measured pair and its thresholds.
+        is_uncorrected: Observed pose of every part after the operation, world, [m].
     """
     solids = assembly.solids
     parts = (assembly.operations[k].moves, tuple(solids))
 
     def place(each: tuple[Contact, FacingPair, PairThresholds]) -> list[int]:
+        # Sort key: index of part and of face, of the manipulated face, then of the environment face.
         return [
             i
             for of, among in zip(each[0], parts, strict=True)

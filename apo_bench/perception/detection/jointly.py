@@ -1,9 +1,9 @@
-"""Detect contacts and estimate poses together: of many sets of contacts the one that explains the poses best.
+"""Detect contacts and estimate poses together: search the set of contacts with the highest posterior probability.
 
-Operation by operation, pairs of faces that may touch are taken or refused, the surest first; each set is scored with
-the poses that it asks for (`estimate`), by how much better it explains what was observed than chance does, less what it
-takes for granted: relations beyond the first, and what physics forbids. The best few sets go on to the next operation,
-which may turn the order round: a stick that fits through two castles says how these were stacked.
+For each operation, a best-first search accepts or rejects pairs of faces that may touch, the most certain first. The
+score of a set is the Bayes factor at its estimated poses (`estimate`) plus penalties (surprise, -2 log of a prior
+probability). Relations beyond the first and physical violations are penalised. The best few sets go on to the next
+operation, which may change their order: a stick through two castles shows how the castles were stacked.
 """
 
 from collections.abc import Iterator
@@ -32,17 +32,20 @@ from apo_bench.perception.detection.situation import Situation
 from apo_bench.perception.detection.thresholds import Rules
 
 GENEROUS_RULES = Rules(gap_m=50e-3, angle_rad=radians(45.0))
-"""What is looked at; what is a contact the score says."""
+"""Wide bounds for candidates; the score decides which of them are contacts."""
 _RELATION = 2.4
 """-2 log of how often faces that may touch do, beyond the relation by which a part rests: three in ten."""
 _KEPT = 3
+"""Sets that go on to the next operation, at most."""
 _ENDINGS = 6
+"""Complete sets of one operation, at most."""
 _SITUATIONS = 50
-"""Sets that go on to the next operation; sets of one operation that are followed to the end, and steps of that."""
+"""Decisions in the search of one operation, at most."""
 _HOPELESS = 12.0
+"""A set that is worse than the best by more is dropped, in twice the log-likelihood."""
 _LOST = 16.0
-"""A set is given up that is worse than the best by so much, in twice the logarithm; and one that throws so much
-evidence away, beyond what physics says against the best."""
+"""The search ends at partial sets that discard more evidence than this plus the least physical surprise of a complete
+set, in twice the log-likelihood."""
 
 
 @check_arguments
@@ -50,10 +53,10 @@ def detect_contacts_jointly(observation: Observation, rules: Rules = GENEROUS_RU
     """Detect the face contacts of every operation together; those of the observation itself are ignored.
 
     Returns:
-        The best set, with how likely it is among those that were compared to the end, and the next best one.
+        The best set, with its posterior probability among those compared to the end, and the second best one.
 
     Raises:
-        InputError: Something else was given.
+        InputError: An argument has another type.
     """
     seen = without_contacts(observation)
     kept = [_History()]
@@ -74,43 +77,48 @@ def detect_contacts_jointly(observation: Observation, rules: Rules = GENEROUS_RU
 
 @dataclass(frozen=True, eq=False)
 class _History:
-    """The contacts of the operations so far, and what comes of them."""
+    """The accepted contacts of the operations so far, with their poses and score."""
 
     taken: tuple[tuple[Candidate, ...], ...] = ()
+    """Per operation."""
     poses: Array | None = None
+    """(n, 4, 4), estimated poses of the n operations so far, world, [m]; None before the first."""
     surprise: float = 0.0
+    """Sum of all penalties, -2 log of a prior probability."""
     badness: float = 0.0
+    """-2 log of the posterior probability, up to a constant."""
 
     @cached_property
     def key(self) -> tuple[frozenset[Contact], ...]:
-        """What makes it another one."""
+        """Its contacts per operation; histories with equal keys are the same."""
         return tuple(frozenset(c.contact for c in some) for some in self.taken)
 
     def follow(self, partial: "_Partial") -> "_History":
-        """With one operation more."""
+        """The history extended by the contacts of the next operation."""
         return _History((*self.taken, partial.taken), partial.at.estimate.poses, partial.surprise, partial.badness)
 
 
 class _Partial(NamedTuple):
-    """Some pairs of faces of one operation taken, some refused."""
+    """A node of the search: some pairs of faces of one operation are accepted, some rejected, the others open."""
 
     at: Situation
+    """Estimated poses with the accepted contacts."""
     taken: tuple[Candidate, ...]
     refused: frozenset[Contact]
     near: tuple[Candidate, ...]
-    """Those that were not taken, where the taken ones put the parts."""
+    """Candidates that were not accepted, measured at the estimated poses."""
     surprise: float
-    """What all contacts so far take for granted."""
+    """Sum of the penalties of all operations so far."""
 
     @property
     def badness(self) -> float:
-        """-2 log of how likely the contacts are, but for a constant."""
+        """-2 log of the posterior probability of the contacts, up to a constant."""
         return self.at.estimate.badness + self.surprise
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The sets of one operation after a history."""
+    """The best-first search for sets of contacts of operation k, after one history of earlier operations."""
 
     seen: Observation
     rules: Rules
@@ -119,7 +127,11 @@ class _Search:
     history: _History
 
     def endings(self) -> Iterator[_Partial]:
-        """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
+        """Yield complete sets, to which no candidate can be added, in ascending order of discarded evidence.
+
+        If there is none, yield the empty set with the penalty `IMPOSSIBLE`.
+        """
+        # A node of the queue: evidence that was discarded on its path, a number that breaks ties, the partial set.
         poses = self.seen.poses[self.k : self.k + 1]
         before = self.history.poses
         beginning = self._with((), poses if before is None else np.concatenate([before, poses]))
@@ -141,12 +153,14 @@ class _Search:
                 if inside(taking.at, self.rules, taking.taken, *best.parts) >= IMPOSSIBLE:
                     partial = refusing
                     continue
-                # What is thrown away where the other way is gone, in twice the logarithm: if touching is likelier (net
-                # below 0), refusing loses -net, less what one more contact would put out of the question.
+                # The less likely decision is queued with the evidence that it discards, in twice the log-likelihood.
+                # If touching is likelier (net below 0), rejecting discards -net, less the gain of the candidates that
+                # accepting would rule out.
                 net = best.distance - best.gain + self._rare(partial, best) - refusal(best, partial.near)
                 other, less = (taking, net) if net > 0.0 else (refusing, max(0.0, self._rival(partial, taking) - net))
                 heappush(waiting, (lost + less, steps, other))
                 partial = refusing if net > 0.0 else taking
+            # A set is contradictory if it rejects a contact that the accepted ones imply.
             if not any(c.implied and self._agrees(c) for c in partial.near):
                 ended += 1
                 offences = physical_surprise(partial.at, self.rules, partial.taken, partial.near)
@@ -156,27 +170,33 @@ class _Search:
             yield beginning._replace(surprise=beginning.surprise + IMPOSSIBLE)
 
     def _open(self, partial: _Partial) -> list[Candidate]:
+        """The candidates that are not decided yet and whose residual the noise explains."""
         return [c for c in partial.near if c.contact not in partial.refused and self._agrees(c)]
 
     def _agrees(self, c: Candidate) -> bool:
-        """Whether the noise explains that they do not look closed."""
+        """True if the noise explains the residual of the pair (chi-square test)."""
         return c.distance <= self.rules.most_of(len(c.pair.residual))
 
     def _likeliest(self, partial: _Partial) -> Candidate | None:
-        """The pair that is surest to touch, of those that are neither taken nor refused."""
+        """The open candidate that is most certain to touch; None if none is open."""
         return min(self._open(partial), key=lambda c: (c.distance - c.gain, c.contact), default=None)
 
     def _rival(self, partial: _Partial, taking: _Partial) -> float:
-        """What the best of the pairs predicts that one more contact puts out of the question, at most 0."""
+        """The lowest distance less gain of the open candidates that accepting one more contact rules out; at most 0.
+
+        Args:
+            taking: `partial` with the contact accepted.
+        """
         left = {c.contact for c in (*self._open(taking), *taking.taken)}
         return min([0.0, *(c.distance - c.gain for c in self._open(partial) if c.contact not in left)])
 
     def _rare(self, partial: _Partial, c: Candidate) -> float:
-        """What it takes for granted that this pair touches, in addition to those that were taken."""
+        """The penalty of a contact that relates two more parts: `_RELATION`, or 0 for the first relation."""
         related = {before.parts for before in partial.taken}
         return _RELATION if related and c.parts not in related else 0.0
 
     def _taking(self, partial: _Partial, some: tuple[Candidate, ...]) -> _Partial:
+        """The partial set with some candidates accepted; implied ones cost no penalty."""
         rare = sum(self._rare(partial, c) for c in some if not c.implied)
         return self._with((*partial.taken, *some), partial.at.estimate.poses, partial.refused, partial.surprise + rare)
 
@@ -187,7 +207,13 @@ class _Search:
         refused: frozenset[Contact] = frozenset(),
         surprise: float | None = None,
     ) -> _Partial:
-        """The set with the poses that it asks for, and what is near there."""
+        """Estimate the poses for a set of contacts, and measure the remaining candidates there.
+
+        Args:
+            taken: Accepted contacts of operation k.
+            begin: (k + 1, 4, 4), initial poses of the estimation.
+            surprise: Sum of penalties; None: that of the history.
+        """
         sets = (*self.history.taken, taken)
         at = Situation(self.seen, self.others, estimate(self.seen, _first(self.seen.assembly, sets), begin))
         near = at.candidates(self.rules, [c.contact for c in taken])
@@ -195,7 +221,7 @@ class _Search:
 
 
 def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assembly:
-    """The first operations, with these contacts."""
+    """The assembly of the first `len(sets)` operations, with these contacts per operation."""
     operations = tuple(
         replace(operation, contacts=tuple(c.contact for c in taken))
         for operation, taken in zip(assembly.operations, sets, strict=False)
@@ -204,7 +230,7 @@ def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assem
 
 
 def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
-    """The best of the histories, with how likely it is, and the next best one."""
+    """Make the result from the histories that remain, sorted best first."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
     is_uncorrected = compute_placements(seen.assembly, seen.start, seen.poses)

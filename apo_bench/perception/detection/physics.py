@@ -1,8 +1,7 @@
-"""Physical constraints on contacts: parts are not inside each other, and what is released rests on something.
+"""Penalties for physically impossible contacts: parts do not overlap, and a released part is supported.
 
-Each is a surprise, -2 log of how likely it is that a set of contacts gives no offence, given how uncertain
-poses still are. Where parts are inside each other by 3 mm, give or take 5, that is little; give or take 0.1, it is
-out of the question.
+Each penalty is a surprise: -2 log of the probability that the constraint holds, given how uncertain the poses still
+are. An overlap of 3 mm with a standard deviation of 5 mm costs little; with 0.1 mm it is impossible.
 """
 
 from collections.abc import Collection
@@ -19,27 +18,28 @@ from apo_bench.perception.detection.thresholds import Rules
 IMPOSSIBLE = 40.0
 """The largest surprise."""
 _OUT_OF_QUESTION = 30.0
-"""Ways out that are less likely are none."""
+"""Displacements out of an overlap with a larger surprise are not tried."""
 _UNSUPPORTED = 18.0
-"""Of a part that rests on nothing: once in 8,000 operations."""
+"""Surprise of a part that nothing supports: once in 8,000 operations."""
 _SOFT_M = 0.3e-3
-"""Parts may be so deep in each other."""
+"""Overlap of this depth is tolerated."""
 _DEEP_M = 2e-3
-"""Where parts that touch are deeper in each other than this, they must still touch once apart."""
+"""If an overlap is deeper, the displacement that resolves it must keep the contacts of the two parts."""
 _UPRIGHT = 0.5
-"""A face whose normal has a larger upward part carries weight."""
+"""A face can carry weight if the absolute vertical component of its normal is larger."""
 _OPPOSITE = -0.9
-"""Cosine between the normals of two walls with a part between them, at most."""
+"""Two walls enclose a part if the cosine between their normals is smaller."""
 _BALANCED_M = 2e-3
-"""How well it is known where weight acts."""
+"""Standard deviation of the point at which the weight acts."""
 
 
 def physical_surprise(at: Situation, rules: Rules, taken: Collection[Candidate], near: Collection[Candidate]) -> float:
-    """How surprising a set of contacts is that one operation made.
+    """The surprise of a set of contacts of one operation, 0 to `IMPOSSIBLE`.
 
     Args:
+        at: The poses estimated with these contacts.
         taken: The contacts.
-        near: Pairs of faces that are near, and are said not to touch.
+        near: Pairs of faces that are near and assumed not to touch.
     """
     if not all(_covers(at, rules, c, np.zeros(3)) for c in taken):
         return IMPOSSIBLE
@@ -50,23 +50,28 @@ def physical_surprise(at: Situation, rules: Rules, taken: Collection[Candidate],
 
 
 def refusal(c: Candidate, near: Collection[Candidate]) -> float:
-    """How surprising it is that two faces do not touch: they are in front of each other, and between walls is room.
+    """The surprise that two near faces do not touch, which requires that their gap is positive.
+
+    If a pair on the opposite side of the same part does not touch either, both gaps must be positive at once.
 
     Args:
-        near: Pairs of faces that were not taken; of those between the same parts that look the other way none touches
-            either where there is no room between.
+        near: Pairs of faces that are assumed not to touch.
     """
     worst = _unlikely(c.pair.gap_m, _soft(c))
     for other in near:
         if other.parts == c.parts and other.normal @ c.normal < _OPPOSITE:
-            # At least so likely is it that both gaps are there at once (Bonferroni): P(A) + P(B) - 1.
+            # Lower bound of the probability that both gaps are positive (Bonferroni): P(A) + P(B) - 1.
             room = sum(float(ndtr((wall.pair.gap_m + _SOFT_M) / _soft(wall))) for wall in (c, other)) - 1.0
             worst = max(worst, -2.0 * log(max(room, exp(-IMPOSSIBLE / 2))))
     return worst
 
 
 def inside(at: Situation, rules: Rules, taken: Collection[Candidate], a: str, b: str) -> float:
-    """Of two parts that are inside each other, the least unlikely way out on which those that touch still do so."""
+    """The surprise of the overlap of parts a and b; 0 if they do not overlap.
+
+    For each overlap the likeliest displacement counts that resolves it and keeps the contacts of the two parts. The
+    largest surprise of all overlaps is returned.
+    """
     solids = at.seen.assembly.solids
     worst = 0.0
     mine = [c for c in taken if c.parts == (a, b)]
@@ -79,8 +84,16 @@ def inside(at: Situation, rules: Rules, taken: Collection[Candidate], a: str, b:
 def _least_unlikely(
     at: Situation, rules: Rules, mine: Collection[Candidate], directions: Array, lengths: Array, deviations: Array
 ) -> float:
+    """The surprise of the likeliest displacement that resolves an overlap; `IMPOSSIBLE` if there is none.
+
+    Args:
+        mine: Contacts between the two parts.
+        directions: (k, 3), unit vectors of the displacements, world.
+        lengths: (k,), [m].
+        deviations: (k,), standard deviation of the position along each direction, [m].
+    """
     for i in np.argsort(lengths / deviations):
-        # Of ways of no length, which are as likely as not, nothing is surprising.
+        # Subtract the surprise of a displacement of length 0, which has the probability 1/2, so that it costs nothing.
         penalty = _unlikely(-lengths[i], deviations[i]) - _unlikely(0.0, 1.0)
         far = lengths[i] > _DEEP_M + 2.0 * at.seen.play_m
         if penalty > _OUT_OF_QUESTION:
@@ -91,12 +104,14 @@ def _least_unlikely(
 
 
 def _covers(at: Situation, rules: Rules, c: Candidate, moved: Array) -> bool:
-    """Whether the faces of a contact cover each other, with the manipulated part moved by (3,), [m].
+    """True if the faces of a contact overlap enough after a displacement of the manipulated part; round ones always do.
 
-    Round faces always do.
+    Args:
+        moved: (3,), displacement, world, [m].
     """
     if at.seen.assembly.is_round(c.contact):
         return True
+    # The estimate may have moved the faces since they became candidates, so half of the share is enough.
     least = rules.share if moved.any() else rules.share / 2
     return _overlap(at, c, moved).area >= least * min(
         measure_face_area(at.seen.assembly.face(face)) for face in c.contact
@@ -104,6 +119,7 @@ def _covers(at: Situation, rules: Rules, c: Candidate, moved: Array) -> bool:
 
 
 def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap:
+    """The overlap of two flat faces, with the manipulated part displaced by `moved`, (3,), world, [m]."""
     m, e = c.contact
     there = np.array(at.now.poses[m.part])
     there[:3, 3] += 0.0 if moved is None else moved
@@ -111,8 +127,10 @@ def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap
 
 
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
-    """Negative log-likelihood that a released part stays: larger if nothing supports it, or if its weight acts outside
-    its support polygon. It is 0 for round parts, for parts that a face above holds down, and for unobserved operations.
+    """The surprise that a released part stays: `_UNSUPPORTED` without support, else by how far its weight tips over.
+
+    It is 0 if the weight acts inside the support polygon, for parts with round faces, for parts that a face above holds
+    down, and for unobserved operations.
     """
     solids = at.seen.assembly.solids
     if not at.seen.observed[at.k] or any(solids[part].rounds for part in at.moves):
@@ -122,7 +140,7 @@ def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
         return _UNSUPPORTED
     if any(c.normal[2] < 0.0 for c in level):
         return 0.0
-    # The centre of mass of all parts that were moved, as of one density, off the hull of the corners they stand on.
+    # The distance of the centre of mass of all moved parts, with equal densities, from the support polygon.
     volumes = np.array([solids[part].volume for part in at.moves])
     middles = [pose.apply(at.now.poses[part], solids[part].centroid[None])[0] for part in at.moves]
     weight = volumes @ np.array(middles) / volumes.sum()
@@ -135,7 +153,12 @@ def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
 
 
 def _beside(feet: Array, weight: Array) -> Array:
-    """The level way from a weight to the nearest point between its feet, (3,), [m]."""
+    """The horizontal vector from a point to the support polygon, (3,), [m]; zero inside.
+
+    Args:
+        feet: (k, 3), points whose convex hull, seen from above, is the support polygon.
+        weight: (3,), the point.
+    """
     from shapely import MultiPoint, Point
     from shapely.ops import nearest_points
 
@@ -144,9 +167,10 @@ def _beside(feet: Array, weight: Array) -> Array:
 
 
 def _soft(c: Candidate) -> float:
+    """Standard deviation of the gap of a pair, with the tolerated overlap included, [m]."""
     return hypot(c.deviation_m, _SOFT_M)
 
 
 def _unlikely(apart: float, deviation: float) -> float:
-    """-2 log of the chance that a Gaussian with this mean is above zero."""
+    """-2 log of the probability that a Gaussian with this mean and deviation is positive, at most `IMPOSSIBLE`."""
     return min(-2.0 * float(log_ndtr(apart / deviation)), IMPOSSIBLE)

@@ -1,4 +1,4 @@
-"""The situation after an operation if some contacts hold: candidates for more, and their uncertainty."""
+"""The estimated situation after an operation under assumed contacts: poses, uncertainties, further candidates."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -17,22 +17,23 @@ from apo_bench.perception.detection.estimate import PoseEstimate
 from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds
 
 _FLAT_M = 0.2e-3
+"""Standard deviation of a gap from the error of linearisation; smaller gaps are no evidence."""
 _FLAT_RAD = radians(0.3)
-"""Gaps and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
+"""Standard deviation of a tilt from the error of linearisation."""
 _LOOSE = PairThresholds(2e-3, radians(2.0))
-"""Added to the bounds of two parts, since overlaps lie off their middles."""
+"""Added to the bounds of two parts, because overlaps lie off the middles of the parts."""
 _NARROW_M = 10e-3
-"""Overlaps that parts with play may tilt in are about as narrow."""
+"""Assumed width of an overlap, for the tilt that play allows."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """The parts after operation k, the last of those that were estimated."""
+    """The parts after operation k, the last operation of an estimate."""
 
     seen: Observation
     others: tuple[str, ...]
-    """The parts that stand there, and are not moved by the operation."""
+    """Parts in place that the operation does not move."""
     estimate: PoseEstimate
 
     @property
@@ -42,30 +43,35 @@ class Situation:
 
     @property
     def moves(self) -> tuple[str, ...]:
-        """The parts that it moved."""
+        """The parts that operation k moves."""
         return self.seen.assembly.operations[self.k].moves
 
     @cached_property
     def now(self) -> PartBeliefs:
-        """Where every part is, and what errors of the poses do to it."""
+        """Poses of all parts after operation k, and their Jacobians by errors of the estimated poses."""
         known = self.estimate
         return Belief(known.assembly, self.seen.start, known.poses, known.covariance).standing(self.k)
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """A part that was moved and one that stands there, both where something was observed."""
+        """Yield each moved part with each part in place, unless their relative pose depends on an unobserved pose."""
         for a in self.moves:
             for b in self.others:
                 if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
                     yield a, b
 
     def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
-        """How uncertain it is where a point of part a, at (3,), is beside part b along directions, (k, 3), [m^2]."""
+        """Variances (k,) of the position of a point of part a relative to part b, [m^2].
+
+        Args:
+            directions: (k, 3), unit vectors along which the position is taken, world.
+            at: (3,), the point, world, [m].
+        """
         # A world twist (v, w) moves a point p by v + w x p, so along d by d . v + (p x d) . w.
         J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._reach(a, b)
         return np.maximum(np.einsum("ki,ij,kj->k", J, self.estimate.covariance, J), 0.0)
 
     def middle(self, part: str) -> Array:
-        """The middle of the box around a part, (3,), world, [m]."""
+        """The centre of the bounding box of a part, (3,), world, [m]."""
         return pose.apply(self.now.poses[part], self.seen.assembly.solids[part].bounds.mean(axis=0)[None])[0]
 
     def candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
@@ -82,7 +88,7 @@ class Situation:
         return tuple(candidates)
 
     def _judged(self, rules: Rules, a: str, b: str, pair: FacingPair) -> Iterator[Candidate]:
-        """The pair as a candidate, if it is one."""
+        """Yield the pair as a candidate with its gain; nothing if it exceeds the thresholds."""
         J = pair.slope @ self._reach(a, b)
         C = J @ self.estimate.covariance @ J.T
         candidate = judge_pair(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
@@ -93,7 +99,10 @@ class Situation:
             yield candidate._replace(gain=gain)
 
     def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
-        """No pair of faces of two parts has wider thresholds: those of the worst point in the worst direction."""
+        """An upper bound of the thresholds of all pairs of faces of two parts.
+
+        It combines the least certain direction at the middle of part a with the turn over half the smaller diagonal.
+        """
         at = self.middle(a)
         reach = self._reach(a, b)
         shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
@@ -108,5 +117,5 @@ class Situation:
         return pair_thresholds(rules, worst, loose)
 
     def _reach(self, a: str, b: str) -> Array:
-        """(6, 6 n): the world twist of part a relative to part b that body twists of the poses make."""
+        """(6, 6 n): Jacobian of the world twist of part a relative to part b by the body twists of the poses."""
         return self.now.reach[a] - self.now.reach[b]

@@ -1,4 +1,4 @@
-"""Thresholds of gap and angle within which the stated noise explains that faces do not touch."""
+"""Thresholds of gap and angle: how far off two touching faces may appear, given the stated noise."""
 
 import math
 from dataclasses import dataclass
@@ -12,23 +12,24 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 CONTACT_SOFT_M = 0.1e-3
+"""Standard deviation of the gap of a true contact: parts sink in a little, and the filter is linear."""
 _SOFT_RAD = math.radians(0.1)
-"""Standard deviation of a contact that is there: parts sink in a little, and the filter is linear."""
+"""Standard deviation of a tilt of a true contact, for the same reasons."""
 
 
 @final
 @dataclass(frozen=True)
 class Rules:
-    """What counts as a contact."""
+    """The bounds within which a pair of faces counts as a contact."""
 
     miss: float = 1e-4
-    """How often the noise may hide one face contact: 20, tested three ways, are then all found 99.4 % of the time."""
+    """Probability that the noise hides one true contact; 20 contacts, three tests each, are all found in 99.4 %."""
     gap_m: float = 10e-3
     """No gap beyond this counts as noise."""
     angle_rad: float = math.radians(20.0)
-    """The largest angle between a normal and the opposite of the other."""
+    """The largest angle between one normal and the opposite of the other."""
     share: float = 0.15
-    """The overlap is at least this part of the smaller face."""
+    """Least overlap as a fraction of the smaller face."""
 
     def __post_init__(self) -> None:
         for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
@@ -39,16 +40,16 @@ class Rules:
             )
 
     def most_of(self, count: int) -> float:
-        """Largest squared Mahalanobis length of so many residuals that the noise explains: a chi-square quantile."""
+        """Largest squared Mahalanobis length of `count` residuals that the noise explains: a chi-square quantile."""
         return _quantile(self.miss, count)
 
 
 RULES_BY_NOISE = Rules()
-"""Thresholds from the stated noise."""
+"""The default rules: thresholds follow from the stated noise, within these bounds."""
 
 
 class PairThresholds(NamedTuple):
-    """The thresholds of one pair of faces."""
+    """Largest gap and angle of one pair of faces."""
 
     gap_m: float
     angle_rad: float
@@ -57,13 +58,13 @@ class PairThresholds(NamedTuple):
 def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, lengths: int = 1) -> PairThresholds:
     """The largest gap and angle that noise and play explain, within the bounds.
 
-    The gap is Gaussian and may lie on either side; the angle is the length of two Gaussian tilts, at most as long as
-    if both were as uncertain as the worse direction. Of round faces the gap may be such a length, too.
+    The gap is Gaussian and two-sided. The angle is the length of two Gaussian tilts, both taken as uncertain as the
+    less certain direction. For round faces the gap may also be such a length.
 
     Args:
-        covariance: (3, 3), of gap and tilts, from the noise of all poses, [m, rad]; (r, r) of round faces.
-        slack: What play allows in addition.
-        lengths: How many rows are lengths, before those of tilts; without any of these the angle is free.
+        covariance: (r, r), of gap and tilts, from the noise of all poses, [m, rad]; r is 3 for flat faces.
+        slack: Gap and angle that play allows in addition.
+        lengths: How many rows are lengths; the tilts follow. Without tilts only `rules` limits the angle.
     """
     gap = _longest(rules.miss, covariance[:lengths, :lengths], CONTACT_SOFT_M)
     angle = _longest(rules.miss, covariance[lengths:, lengths:], _SOFT_RAD)
@@ -71,13 +72,18 @@ def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, leng
 
 
 def _longest(miss: float, covariance: Array, soft: float) -> float:
-    """The length of Gaussian numbers, (r, r), that is exceeded so rarely, each as uncertain as the worst direction."""
+    """The length of a Gaussian vector that is exceeded with probability `miss`; infinite if it has no component.
+
+    Args:
+        covariance: (r, r); all directions are taken as uncertain as the least certain one.
+        soft: Standard deviation of a true contact, added in every direction.
+    """
     if len(covariance) == 0:
         return math.inf
     if len(covariance) == 1:
         return _two_sided(miss) * math.sqrt(covariance[0, 0] + soft**2)
-    # The length of r Gaussian numbers of one variance is that times chi with r degrees of freedom; of two, Rayleigh's
-    # distribution, whose quantile has a closed form.
+    # The length of r Gaussian numbers of equal variance has a chi distribution with r degrees of freedom, scaled by the
+    # standard deviation. For two it is the Rayleigh distribution, whose quantile has a closed form.
     worst = max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)
     if len(covariance) == 2:
         return math.sqrt(-2.0 * math.log(miss) * (worst + soft**2))
@@ -85,14 +91,14 @@ def _longest(miss: float, covariance: Array, soft: float) -> float:
 
 
 def slack(pair: FacingPair, play_m: float) -> PairThresholds:
-    """How far off a contact with this play can be: from side to side, and tilted from corner to corner."""
+    """Gap and tilt that a true contact with this play per side can have."""
     return PairThresholds(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
 
 
 def reality(pair: FacingPair, play_m: float) -> Array:
-    """(3, 3), covariance of gap and tilts of a contact that is there: uniform within its play, and a little soft.
+    """The covariance (r, r) of gap and tilts of a true contact: uniform within its play, plus softness, [m, rad].
 
-    (r, r) of round faces.
+    r is 3 for flat faces.
     """
     # Uniform within +-p has the variance p^2 / 3; a face of half length h may tilt by p / h.
     tilts = [play_m / max(half, play_m, 1e-9) for half in pair.half_m]

@@ -1,4 +1,4 @@
-"""Noise models by name."""
+"""Make a noise model from its name, file, class or function."""
 
 import inspect
 import math
@@ -36,19 +36,18 @@ NOISES = MappingProxyType(
     }
 )
 _RATES = MappingProxyType({"p": "rate", "r": "repeat"})
-"""What may be stated of a camera that fails now and then -> what it is called there."""
+"""Key in the name of a failure model (`flips:p=0.1/r=0.5`) -> argument of `make_failures`."""
 
 
 def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
-    """The noise model that a name stands for.
+    """Make a noise model.
 
     Args:
-        given: A name out of `NOISES`, one out of `FAILURES` with its rates (`flips:p=0.1/r=0.5`),
-            `"package.module:name"`, a noise file (`.toml`, the name of one that comes with the package, or
-            `"empirical:"` and a file of residuals), or the object: a class is made with the level, a function
-            `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(poses, rng) -> poses` that has
-            attributes `deviation_mm` and `deviation_deg`.
-        level: How much noise.
+        given: A name of `NOISES`; one of `FAILURES` with its rates (`flips:p=0.1/r=0.5`); `"package.module:name"`; a
+            noise file (`.toml`, the name of one in the package, or `"empirical:"` and a file of residuals); or an
+            object. A class is instantiated with the noise level. A function `(assembly, shown, rng) -> Observation` is
+            used unchanged, and a function `(poses, rng) -> poses` needs attributes `deviation_mm`, `deviation_deg`.
+        noise_level: Standard deviation per axis, [mm, degrees].
 
     Raises:
         InputError: There is no such noise model, it cannot be made or does not say how large its errors are, or the
@@ -80,7 +79,7 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
 
 
 def _failing(given: str, noise_level: NoiseLevel) -> Noise:
-    """A camera that fails now and then, as often as its name says: `flips:p=0.1/r=0.5`."""
+    """Make the failure model of a name with rates, such as `flips:p=0.1/r=0.5`."""
     name, colon, stated = given.partition(":")
     entries = [entry.partition("=") for entry in stated.split("/")] if colon else []
     try:
@@ -95,9 +94,10 @@ def _failing(given: str, noise_level: NoiseLevel) -> Noise:
 
 
 def _noise(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
-    """What can be called, from what a name stands for."""
+    """Make a noise model of a resolved object: instantiate a class, wrap a plain function `(poses, rng) -> poses`."""
     if isinstance(model, type):
         model = model(noise_level)
+    # A function that accepts two or three arguments is plain if it declares its deviation.
     plain = _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3))
     require(
         plain or _takes(model, 3),
@@ -108,13 +108,13 @@ def _noise(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
 
 
 def _unknown(given: str, names: Iterable[str]) -> str:
-    """What to say to a name that is none."""
+    """The error message for an unknown name."""
     sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
     return sentence + " Or give your own as 'package.module:name'."
 
 
 def _takes(model: Any, arguments: int) -> bool:
-    """Whether it can be called with so many arguments."""
+    """True if `model` can be called with this number of positional arguments."""
     try:
         inspect.signature(model).bind(*[None] * arguments)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Noise files: a measured pose estimator as TOML."""
+"""Read and write noise files (TOML), which state the measured error distribution of a pose estimator."""
 
 import math
 from collections.abc import Mapping
@@ -27,14 +27,15 @@ from apo_bench.resources import folder
 from apo_bench.scenario.values import Pose
 
 _FARTHEST_MM = 1e5
+"""Largest allowed distance of an outlier."""
 _HUGE = 1e300
-"""Degrees of freedom beyond are infinitely many."""
+"""Largest degrees of freedom in a file; read as infinite, which is a Gaussian."""
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 _Freedom = Annotated[float, Meta(ge=LEAST_FREEDOM)]
 
 
 def _split_table(name: str, unit: str) -> Any:
-    """Make the type of a table of the distribution of errors across and along a ray."""
+    """Make the type of a table that states the distribution of errors across and along a camera ray."""
     fields = [
         (f"limit_{unit}", Annotated[float, Meta(ge=1e-3)]),
         (f"across_scale_{unit}", float),
@@ -46,13 +47,13 @@ def _split_table(name: str, unit: str) -> Any:
 
 
 ShiftTable = _split_table("ShiftTable", "mm")
-"""`[shift]`."""
+"""Table `[shift]`: errors of the position."""
 TurnTable = _split_table("TurnTable", "deg")
-"""`[turn]`."""
+"""Table `[turn]`: errors of the rotation."""
 
 
 class NoiseFileTable(FileTable, frozen=True, kw_only=True):
-    """A whole file."""
+    """All entries of a noise file."""
 
     schema: Literal["apo-bench/noise/2"]
     source: Text
@@ -65,14 +66,16 @@ class NoiseFileTable(FileTable, frozen=True, kw_only=True):
 
 
 def presets() -> Mapping[str, Path]:
-    """Return the noise files that come with the package, by the names they go by."""
+    """Return the noise files of the package: name -> path."""
     return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
 
 
 def noise_path(name: str) -> Path | None:
-    """Return the file behind the name of a noise model, None if there is none.
+    """Return the file that the name of a noise model refers to; None if the name refers to no file.
 
-    A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
+    Args:
+        name: A path that ends in .toml, the name of a noise file of the package, or `empirical:` and the path of a file
+            of residuals.
     """
     if name.startswith(RESIDUALS):
         return Path(name.removeprefix(RESIDUALS))
@@ -82,10 +85,10 @@ def noise_path(name: str) -> Path | None:
 
 
 def noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | None:
-    """Make the noise model of such a name, None if it is no such name.
+    """Make the noise model of a name as in `noise_path`; None if the name refers to no file.
 
     Raises:
-        InputError: Anything in the file that is not as described, naming file and place.
+        InputError: The file is not valid; the message names file and place.
     """
     path = noise_path(name)
     if path is None:
@@ -97,10 +100,10 @@ def noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | Empirical
 
 
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
-    """Read what a noise file states, and the camera it names, else the default one.
+    """Read a noise file; return the measured distribution and the camera, the default one if the file states none.
 
     Raises:
-        InputError: Anything in the file that is not as described, naming file and place.
+        InputError: The file is not valid; the message names file and place.
     """
     top = read_typed(path, NoiseFileTable, "noise file")
     shift = _split(top.shift, f"{path}, shift", 1000.0)
@@ -118,9 +121,15 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
 
 
 def _split(table: msgspec.Struct, place: str, largest: float) -> Split:
+    """Make the distribution of a `[shift]` or `[turn]` table.
+
+    Args:
+        place: File and table, for error messages.
+        largest: Largest allowed limit, [mm] or [degrees].
+    """
     limit, across_scale, across_freedom, along_scale, along_freedom = msgspec.structs.astuple(table)
     require(limit <= largest, f"{place}, limit: a number up to {largest:g} is needed, not {limit:g}.")
-    low = 0.9 * SMALLEST_SCALE * limit
+    low = 0.9 * SMALLEST_SCALE * limit  # 0.9 is a margin for rounded numbers in a file
     for scale in (across_scale, along_scale):
         require(low <= scale <= limit, f"{place}: scales from {low:g} to the limit are needed, not {scale:g}.")
     return Split(_tail(across_scale, across_freedom), _tail(along_scale, along_freedom), limit)
@@ -131,7 +140,7 @@ def _tail(scale: float, freedom: float) -> Tail:
 
 
 def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
-    """Return a noise file as text, with notes at its head."""
+    """Return the text of a noise file, with notes as comments at its head."""
     document = {
         "schema": "apo-bench/noise/2",
         "source": measured.source,
@@ -155,4 +164,5 @@ def _split_form(split: Split, unit: str) -> dict[str, float]:
 
 
 def _digits(x: float) -> float:
+    """Round to five significant digits."""
     return float(f"{x:.5g}")

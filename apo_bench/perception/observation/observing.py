@@ -1,4 +1,4 @@
-"""Observe a demonstration through a noise model."""
+"""Observe a demonstration through a noise model, and check what the model returned."""
 
 from dataclasses import replace
 from typing import Any
@@ -57,7 +57,7 @@ def observe(
 
 
 def _complaint(demonstration: Demonstration, seen: Any) -> str:
-    """What is wrong with what a noise model returned; empty if nothing is."""
+    """The fault of the value that a noise model returned, as the end of an error message; empty if it is valid."""
     if not isinstance(seen, Observation):
         return f"returned {type(seen).__name__}; return an apo_bench.assembly.Observation"
     if seen.assembly is not demonstration.assembly:
@@ -67,7 +67,7 @@ def _complaint(demonstration: Demonstration, seen: Any) -> str:
     if not is_rigid(seen.poses).all():
         k = int(np.argmin(is_rigid(seen.poses)))
         return f"returned a pose of operation {k + 1} that is not rigid; return `shown.poses[k] @ exp(twist)`"
-    # On correlations, so that [m] and [rad] weigh the same.
+    # Checked on correlations, so that the units [m] and [rad] do not matter.
     deviation = np.sqrt(np.maximum(np.diagonal(seen.covariance, axis1=1, axis2=2), 1e-300))
     correlation = seen.covariance / (deviation[:, :, None] * deviation[:, None, :])
     off = np.abs(correlation - np.swapaxes(correlation, 1, 2)).max(axis=(1, 2), initial=0.0)

@@ -1,4 +1,4 @@
-"""A plain function `(poses, rng) -> poses` as a noise model."""
+"""Wrap a plain function `(poses, rng) -> poses` as a noise model."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,18 +13,20 @@ from apo_bench.geometry import Array
 from apo_bench.perception.observation.models import floor_covariance
 
 _LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}
-"""What a function declares as attributes, and the largest that is allowed."""
+"""Attributes that a function must declare -> largest allowed value."""
 
 
 @final
 @dataclass(frozen=True)
 class Plain:
-    """The function's poses, all of them observed, with the deviations that it declares along and about every axis."""
+    """A noise model that returns the poses of a function, all observed, with the standard deviations it declares."""
 
     function: Callable[[Array, np.random.Generator], ArrayLike]
-    """(n, 4, 4), world frame, [m], and chance; returns as many poses. Its argument is a copy."""
+    """(true poses (n, 4, 4), generator) -> noisy poses (n, 4, 4), world frame, [m]. Its argument is a copy."""
     deviation_mm: float
+    """Declared standard deviation along every axis."""
     deviation_deg: float
+    """Declared standard deviation about every axis."""
 
     @property
     def __name__(self) -> str:
@@ -41,7 +43,7 @@ def declare(function: Any, name: str) -> Plain:
     """Make a noise model of a function with the attributes `deviation_mm` and `deviation_deg`.
 
     Raises:
-        InputError: It declares none, or what makes no sense.
+        InputError: An attribute is missing or out of range.
     """
     for field, largest in _LIMITS.items():
         value = getattr(function, field, None)

@@ -1,4 +1,4 @@
-"""Observe a demonstration again: fresh draws of the same noise, as many as are allowed."""
+"""Observe a demonstration again on request: a limited number of new draws of the same noise."""
 
 from collections.abc import Collection
 from copy import deepcopy
@@ -17,9 +17,9 @@ from apo_bench.records import check
 
 @final
 class Reobservations:
-    """A `apo_bench.assembly.Reobserver`: it knows the demonstration, and hands out nothing but observations.
+    """The `apo_bench.assembly.Reobserver` of a trial; a corrector gets only its observations, not the demonstration.
 
-    Each reobservation draws all operations, so that the pose of one does not depend on which were requested.
+    Each reobservation draws all operations, so the pose of one does not depend on which others were requested.
     """
 
     def __init__(
@@ -33,19 +33,19 @@ class Reobservations:
     ) -> None:
         """Args:
             noise: As in `observe`.
-            rng: Not the one that the first observation was drawn from, which would change that of others.
-            allowed: How many reobservations.
-            assembly: What the corrector gets, if that is not right.
-            first: As the first observation was drawn from, not used yet: noise that has a method `again` (assembly,
-                demonstration, rng, first) may repeat what was false in that.
+            rng: A separate generator, not the one of the first observation.
+            allowed: Number of reobservations.
+            assembly: The assembly in the observations, where its contacts are wrong on purpose. Default: the right one.
+            first: A generator in the state in which the first observation used it. A noise model with a method `again`
+                (assembly, demonstration, rng, first) can repeat failures of the first observation.
 
         Raises:
-            InputError: The number is not allowed.
+            InputError: `allowed` is out of range.
         """
         check("max_reobservations", allowed)
         self.left = allowed
         self.reobservations = 0
-        """Operations that were observed again, each as often as that was."""
+        """Number of reobserved operations so far; an operation counts each time it is reobserved."""
         self._demonstration = demonstration
         self._noise = noise
         self._rng = rng

@@ -1,10 +1,10 @@
-"""Sources of wrong contacts, to test what a corrector makes of them.
+"""Sources of wrong contacts, to test how robust a corrector is.
 
 `omit_contact`  one contact is missing
 `add_contact`   one contact too many: two faces that only come near each other
 `FaceOffset`    one face lies off the face of the part's model, along its normal
 
-The truth, the human, the robot and the judge keep the right contacts; only what a corrector gets is wrong.
+Only the input of the corrector is wrong. Demonstration, robot and judge keep the right contacts.
 """
 
 import math
@@ -39,24 +39,25 @@ ContactSource = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly
 """Any function `(assembly, start, poses, rng) -> Assembly`: right contacts and poses in, wrong contacts out."""
 
 _OPPOSED_RAD = math.radians(10.0)
-"""Faces look at each other if one normal is this near to the opposite of the other."""
+"""Two faces oppose each other if one normal is within this angle of the opposite of the other."""
 TOUCHING_M = 0.5e-3
+"""Faces with a smaller gap touch, or nearly, so they make no false contact."""
 NEAR_FACES_M = 15e-3
-"""Faces that are closer touch, or nearly; faces that are farther apart make no contact."""
+"""Faces with a smaller gap are near enough to be mistaken for a contact."""
 _COVERED_M2 = 25e-6
-"""Faces that cover less of each other do not meet, (5 mm)^2."""
+"""Flat faces overlap if the area is larger, (5 mm)^2."""
 _SHARED = 0.15
-"""Round faces that have less of their length in common do not meet."""
+"""Round faces overlap if they share a larger fraction of their length."""
 
 
 def make_contacts(given: Any) -> ContactSource | None:
-    """Return the function that a name stands for; None for `given`, where nothing is wrong.
+    """Return the contact source of a name; None for `given`, which keeps the right contacts.
 
     Args:
         given: A name as in `apo_bench.records.contact_sources`, `"package.module:name"`, or the function itself.
 
     Raises:
-        InputError: There is no such thing.
+        InputError: The name is unknown, or the object is not a function.
     """
     name = (
         normalise_contact_source(given) if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
@@ -99,7 +100,7 @@ def replace_contacts(
 
 
 def _complaint(right: Assembly, wrong: Any) -> str:
-    """Return what is wrong with what a source of contacts returned; empty if nothing is."""
+    """Return the fault of the value that a contact source returned, as the end of an error message; empty if valid."""
     if not isinstance(wrong, Assembly):
         return f"returned {type(wrong).__name__}; return an Assembly"
     operations, before = ([replace(each, contacts=()) for each in of.operations] for of in (wrong, right))
@@ -115,22 +116,22 @@ def _complaint(right: Assembly, wrong: Any) -> str:
 
 
 def culprit(right: Assembly, wrong: Assembly) -> str | None:
-    """The relation (R1, R2, ... of the wrong graph) with a contact that is not a right one; None if there is none."""
+    """The first relation (R1, R2, ...) of the wrong relation graph that contains a wrong contact; None if none does."""
     arcs = build_relation_graph(wrong).arcs
     return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
 def omit_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
-    """One contact, any, is not there."""
+    """Remove one contact, chosen at random."""
     k, contact = _any(assembly, rng)
     return _with(assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact))
 
 
 def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
-    """One contact too many: a face of a part that was moved and one that it faces, less than 15 mm apart.
+    """Add one false contact between two opposed faces that overlap and are less than 15 mm apart, chosen at random.
 
-    Where no two faces come so near, the nearest pair is taken that covers each other, or, failing that, that look at
-    each other at all; an assembly without even those is left as it is.
+    If there are none, the nearest overlapping pair is taken, else the nearest opposed pair. An assembly without opposed
+    faces is returned unchanged.
     """
     pairs = list(_facing(assembly, start, poses))
     near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_FACES_M]
@@ -146,12 +147,13 @@ def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.G
 @final
 @dataclass(frozen=True)
 class FaceOffset:
-    """One contact, any, has its lower face off along the normal, outwards or inwards.
+    """Displace the environment face of one contact, chosen at random, along its normal, outwards or inwards.
 
-    A round face is off across its axis, in any direction.
+    A round face is displaced across its axis, in a random direction.
     """
 
     size_m: float = FACE_OFFSET_MM * 1e-3
+    """Length of the displacement."""
 
     def __call__(self, assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
         k, contact = _any(assembly, rng)
@@ -166,17 +168,19 @@ class FaceOffset:
 
 
 class _Pair(NamedTuple):
-    """Two faces that look at each other, or have nearly the same axis, and do not touch."""
+    """Two opposed flat faces, or two round faces with nearly parallel axes, that do not touch."""
 
     made: int
+    """The operation after which they are so near, counted from 0."""
     contact: Contact
     apart_m: float
-    """Distance of their planes, in the middle; of their axes."""
+    """Distance of flat faces, or gap of round ones."""
     covered: bool
+    """True if the faces overlap."""
 
 
 def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
-    """One of all contacts ever made, each as likely, and the operation that made it."""
+    """Draw one of all contacts with equal probability; return the operation that makes it, and the contact."""
     relations = assembly.relations()
     require(relations, "the assembly has no contact that could be wrong; use `given`.")
     chosen = relations[int(rng.integers(len(relations)))]
@@ -184,7 +188,7 @@ def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
 
 
 def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
-    """Faces of parts that an operation moved, and faces of those that stand there, apart by more than nothing."""
+    """Yield the opposed pairs that do not touch, of moved parts and parts in place, after each operation."""
     standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
     for k, stage in enumerate(compute_placements(assembly, start, poses)):
         moves = assembly.operations[k].moves
@@ -207,7 +211,7 @@ def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
 
 
 def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Generator) -> Face | RoundFace:
-    """A flat face moved along its normal, a round one across its axis in any direction."""
+    """Move a flat face along its normal, or a round one across its axis in a random direction; rename it."""
     if isinstance(face, RoundFace):
         turn = rng.uniform(0.0, 2.0 * math.pi)
         across = math.cos(turn) * face.frame[:3, 0] + math.sin(turn) * face.frame[:3, 1]
@@ -217,13 +221,14 @@ def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Gene
 
 
 def _with_face(solid: Solid, face: Face | RoundFace) -> Solid:
+    """The solid with one more face."""
     if isinstance(face, RoundFace):
         return replace(solid, rounds={**solid.rounds, face.name: face})
     return replace(solid, faces={**solid.faces, face.name: face})
 
 
 def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:
-    """An assembly in which operation k makes these contacts, all else unchanged."""
+    """The assembly with these contacts for operation k."""
     operations = list(assembly.operations)
     operations[k] = replace(operations[k], contacts=contacts)
     return replace(assembly, operations=tuple(operations))

@@ -1,1 +1,1 @@
-"""How a part comes into its contacts: contact states, macros, ways of insertion."""
+"""Geometry of insertion: contact states, macros (straight motions), and the straight line on which a part arrives."""

@@ -1,4 +1,4 @@
-"""How a part comes into its contacts: its macros, and the straight line on which it arrives."""
+"""Plan how a part comes into its contacts: its macros, and the straight line on which it arrives at its goal."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -31,37 +31,40 @@ from apo_bench.planning.insertion.states import (
 )
 
 _ROOM_M = 0.02
-"""A part begins its way in so far outside of what it goes into."""
+"""Added to the exit distance: gap between the part and the walls around its goal where the line begins."""
 _TRAVEL_M = 0.03
-"""How far before its goal the line begins at least."""
+"""Least length of the line, from its beginning to the goal."""
 _LONGER_M = (0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16)
-"""Where it is roofed there, the line is longer, unless it is as good as vertical."""
+"""Lengths tried if something is above the beginning of every shorter line; not tried for vertical lines."""
 _STRAIGHT = 0.99
+"""A line counts as vertical if its cosine with the vertical is at least this."""
 _OPENS = 0.015
+"""Share of the sum of all normals added to one normal, for an exit that opens the other contacts slightly."""
 CLEAR_M = 0.3
-"""A part comes from above to where its way in begins: so much above that place must be free."""
+"""A part reaches the beginning of its line from above, so this height above it must be free."""
 _LIFTED = 0.1
-"""A contact opens when the part is lifted if the sine of its normal to the level is above this."""
+"""A contact opens when the part is lifted if the z component of its unit normal is above this."""
 _SAME = 1e-9
+"""Unit vectors with a smaller difference are equal."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Arrival:
-    """A part at a place, and how it comes there."""
+    """A part at its place, the macros and the line by which it comes there, and the macros by which it leaves."""
 
     main: str
     T: Array
-    """(4, 4), where the main part then is; directions below are in the frame of the same world."""
+    """(4, 4): pose of the main part at its place, world frame; so are all directions but that of `line`."""
     touched: tuple[TouchedContact, ...]
     chain: Chain
-    """The macros by which the part comes; `touched` by number, in which a round contact stands once per normal."""
+    """The macros by which the part comes; their contact numbers index `touched` (a round contact: once per normal)."""
     departs: tuple[Macro, ...]
-    """By which the part leaves again, apart from being lifted."""
+    """The macros by which the part leaves again; a final lift off supports is not among them."""
     line: Attach
-    """The line on which it arrives, in its own frame."""
+    """The line on which the part arrives, in the frame of the part."""
     free: bool
-    """Whether nothing is in the way of that line, nor above its beginning."""
+    """Whether the line, and the space above its beginning, are free of other parts."""
 
     def __post_init__(self) -> None:
         freeze(self, T=(4, 4))
@@ -75,16 +78,22 @@ class Arrival:
         return self.chain.macros
 
     def contacts(self, macro: Macro) -> tuple[Contact, ...]:
-        """The contacts that a macro makes, or opens, each once."""
+        """The contacts that a macro makes (`depart`: opens), each once."""
         return tuple(dict.fromkeys(self.touched[i].contact for i in macro.makes))
 
     def own(self, direction: Array) -> Array:
-        """A direction, (3,), in the frame of the part."""
+        """A world direction, (3,), in the frame of the part."""
         return _to_part_frame(direction, self.T)
 
     @property
     def axes(self) -> tuple[Array, Array, Array]:
-        """Directions of the part's place, each (k, 3): settled by position, by feeling, by walls."""
+        """Three bases of world directions, each (k, 3), by what determines the position of the part along them.
+
+        Returns:
+            (position, felt, across): directions in which no contact constrains the part, so its position must be
+            commanded; directions of the guarded macros, which end on contact; directions between walls that enclose the
+            part.
+        """
         cone = classify(_normals(self.touched))
         walls = cone.rows[~cone.detachable]
         position = _readable(null_space(cone.rows), self.T)
@@ -101,12 +110,14 @@ def arrive(
     stated: Preference = ANY,
     angle_rad: float = ANGLE_RAD,
 ) -> Arrival:
-    """How what moves, the main part first, comes into its contacts.
+    """Plan how parts that move together come into their contacts.
 
     Args:
-        poses: Every part, what moves at its goal, z upwards, [m]. Nothing else may be inside of anything.
-        stated: A line to be preferred, in the frame of the main part; one that leads through a contact is not.
-        angle_rad: Normals this near to parallel are; more than rounding where poses were only seen.
+        moves: Names of the parts that move, the main part first.
+        contacts: Contacts between moving and resting parts that are closed at the goal.
+        poses: Of every part, with what moves at its goal, z upwards, [m]. No part may intersect another.
+        stated: Preferred line, in the frame of the main part. Its direction is ignored if it leads through a contact.
+        angle_rad: Normals within this angle are parallel; larger than rounding if the poses were observed.
     """
     T = poses[moves[0]]
     touched = tuple(find_touched_contacts(assembly, contacts, moves, poses))
@@ -119,24 +130,31 @@ def arrive(
     if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
         direction = None
 
+    # In the helpers below `way` is the unit vector of an exit from the goal, world frame.
     def along_is_free(way: Array, length_m: float) -> bool:
+        """Whether the moving parts can move along `way` by a length."""
         return is_way_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
+        """Whether an exit is free, and then the space above its end, from where the part descends."""
         begin = [PosedPieces(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
         return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
-        # For a part that is free after a way the line is as long as that and some room, in whole millimetres.
+        """Length of the line for an exit distance, [m]."""
+        # Line length: exit distance plus the gap, rounded up to whole millimetres unless a length is stated.
         millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3))
         return max(_TRAVEL_M, millimetres) if stated.travel_m is None else stated.travel_m
 
     def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
+        """The first free exit between walls, by their numbers; the first candidate if none is free."""
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
-        floors = [normals[i] for i in range(len(normals)) if i not in walls]
+        floors = [normals[i] for i in range(len(normals)) if i not in walls]  # contacts that the exit may open
+        # A stated direction leads to the goal, so the exit goes the opposite way.
         there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
 
         def length(u: Array) -> float:
+            # Round walls may end farther out than the solids around the part require.
             ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
             return max(compute_exit_distance(moving, u, around), *ends)
 
@@ -145,16 +163,20 @@ def arrive(
             ways.append(StraightExit(u, length(u), False))
             if clear(u, reach(ways[-1].length_m)):
                 return ways[-1]._replace(free=True)
-        return ways[0]
+        return ways[0]  # no exit is free: the first candidate, marked as not free
 
+    # From here on: the part leaves walls on `macros.way`, otherwise an exit off open contacts is searched.
     macros = chain(normals, out, float(np.sin(angle_rad)))
     if macros.way is not None:
         line = Attach(_to_part_frame(-macros.way.direction, T), reach(macros.way.length_m))
         is_free = macros.way.free
     else:
         there = list(_admissible(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
+        # Parts that rest against the moving parts from above (contact normal downwards) are roofs to get out from
+        # under.
         over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
         tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
+        # Slanted exits whose shortest extended line is free are tried with all longer lines.
         aslant = (way for way in there if stated.travel_m is None and abs(way @ UP) < _STRAIGHT)
         longer = product((way for way in aslant if along_is_free(way, _LONGER_M[0])), _LONGER_M)
         found_free = next((each for each in chained(tried, longer) if clear(*each)), None)
@@ -163,20 +185,31 @@ def arrive(
         line = Attach(_to_part_frame(-way, T), length_m)
     if direction is not None:
         line = Attach(direction, line.travel_m)
+    # Contacts that carry the part, since their normals point upwards.
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > _LIFTED)
     return Arrival(moves[0], T, touched, macros, departure(macros, supports), line, is_free and not macros.locked)
 
 
 def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Array) -> float:
-    """How far a part must be moved until round walls no longer enclose it, however loosely, [m]; 0 of flat ones."""
-    if touched.points is None:
+    """Exit distance of a part along `way` until round walls no longer enclose it, [m]; 0 for flat contacts.
+
+    A loose fit counts as enclosing, too.
+    """
+    if touched.points is None:  # a flat contact
         return 0.0
     m, e = touched.contact
+    # The resting feature comes first; the measured insertion goes against the exit.
     return measure_entrance_depth(assembly, *((e, m) if touched.rests == m.part else (m, e)), poses, -way)
 
 
 def _past(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces]) -> float:
-    """How far parts must be moved until no roof is above any of them, at most, [m]."""
+    """Distance along `way` after which no moving part is under a roof, [m]; 0 without roofs or if `way` is steep.
+
+    Args:
+        way: Unit vector of the exit, (3,), world frame.
+        roofs: Parts above the moving ones.
+    """
+    # Extents along `way` of moving parts, ends[0], and of roofs, ends[1], in the world frame.
     ends = [
         [np.add(measure_extent(p.pieces, p.T[:3, :3].T @ way), p.T[:3, 3] @ way) for p in of] for of in (moving, roofs)
     ]
@@ -184,16 +217,17 @@ def _past(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces
 
 
 def turning_state(assembly: Assembly, arrival: Arrival, poses: Poses) -> Screw:
-    """The state of what has arrived if it may also turn; `poses` as it was understood at."""
+    """Contact state of an arrived part with rotations included (screws); `poses` as given to `arrive`."""
     return screw_state(*find_touch_points(assembly, arrival.touched, poses))
 
 
 def _readable(basis: Array, T: Array) -> Array:
-    """A basis of the span of (m, 3) that people can read: axes of the part at T that lie in it, then what is left."""
+    """A basis, (m, 3), of the span of `basis` that is easy to read: axes of the part come first."""
     axes: list[Array] = []
     inside = [axis for axis in T[:3, :3].T if np.linalg.norm(basis.T @ (basis @ axis) - axis) < 1e-6]
     for axis in (*inside, *basis):
         rest = basis.T @ (basis @ axis)
+        # Gram-Schmidt: remove what earlier axes already span.
         rest = rest - sum(((rest @ other) * other for other in axes), np.zeros(3))
         if np.linalg.norm(rest) > 1e-6 and len(axes) < len(basis):
             axes.append(rest / np.linalg.norm(rest) + 0.0)
@@ -201,10 +235,13 @@ def _readable(basis: Array, T: Array) -> Array:
 
 
 def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
-    """Ways off contacts that enclose nothing: straight up if that is one, as the first contact or the last one opens,
-    any other, at last off each, opening the others a little or not at all."""
+    """Candidate exits, unit vectors (3,), off contacts that do not enclose the part, the best first.
+
+    The order: straight up; against the first and the last macro; the direction that opens all contacts; axes of the
+    part; each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
+    """
     cone = classify(normals)
-    if macros.locked:
+    if macros.locked:  # no straight exit exists: any direction serves
         yield UP
         return
     back = [-macros.macros[i].direction for i in (0, -1)] if macros.macros else []
@@ -216,21 +253,29 @@ def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
 
 
 def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Array]:
-    """Ways out between walls: up, off the floor, and along the axes of the part, backwards before forwards."""
+    """Candidate exits between walls, unit vectors (3,) in the span of `along`, the best first.
+
+    The order: up, off the floors, the axes of the part (negative before positive), then the rows of `along`.
+
+    Args:
+        along: Directions in which all walls stay closed, orthonormal, (m, 3).
+        floors: Normals of the contacts that are not walls.
+    """
     axes = [sign * axis for sign in (-1.0, 1.0) for axis in T[:3, :3].T]
     for way in (UP, *floors, *axes, *(-along), *along):
         within = along.T @ (along @ way)
         size = float(np.linalg.norm(within))
-        if size > 0.5:
+        if size > 0.5:  # candidates more than 60 degrees off the span are skipped
             yield np.round(within / size, 12) + 0.0
 
 
 def _normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) -> Array:
+    """Unit normals of contacts, (k, 3), with those within `angle_rad` of each other made equal."""
     return snap_normals(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
 
 
 def _to_part_frame(direction: Array, T: Array) -> Array:
-    """A direction in the frame of the part; exact where it is vertical."""
+    """A world direction, (3,), in the frame of a part at T; straight down stays exact, all else is rounded."""
     if np.linalg.norm(direction + UP) < _SAME:
         return np.asarray(T[:3, :3].T @ -UP)
     return np.asarray(np.round(T[:3, :3].T @ direction, 12) + 0.0)

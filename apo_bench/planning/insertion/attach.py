@@ -1,4 +1,4 @@
-"""The straight line on which a part comes to its goal, stated or planned."""
+"""The straight line on which a part comes to its goal, planned (`Attach`) or preferred (`Preference`)."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, final
@@ -15,7 +15,7 @@ class Attach:
     direction: Array
     """Unit vector of the motion, (3,), in the frame of the main part at its goal."""
     travel_m: float
-    """How far before the goal the line begins."""
+    """Length of the line, from its beginning to the goal, [m]."""
 
     def __post_init__(self) -> None:
         freeze(self, direction=(3,))
@@ -27,11 +27,12 @@ class Attach:
 
 
 class Preference(NamedTuple):
-    """What of a line of attach is stated; the rest is left to the plan."""
+    """The stated parts of a line of attach; the planner chooses the others."""
 
     direction: Array | None = None
-    """The direction of the line, (3,), as in `Attach`; None where it is not stated."""
+    """As in `Attach`; None: the planner chooses."""
     travel_m: float | None = None
+    """As in `Attach`; None: the planner chooses."""
 
 
-ANY = Preference()
+ANY = Preference()  # nothing is stated

@@ -1,7 +1,7 @@
-"""Macros: the straight motions by which a part comes into its contacts, found by taking them off in thought.
+"""Macros: the straight motions by which a part comes into its contacts, found by planning its disassembly (`peel`).
 
-What is taken off last is made first (`peel`). A contact that opens is made by a guarded motion
-until it is felt; walls that enclose the part are made by an insertion to a place that must be known before.
+The contact that disassembly opens last is made first. Contacts that can open are made by a guarded motion, which ends
+when contact is detected. Walls that enclose the part are made by an insertion to a known position.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,22 +25,23 @@ MacroName = Literal[
 _INSERTIONS: tuple[MacroName, ...] = ("insert-into", "insert-between", "insert-into-slot")
 UP = np.array([0.0, 0.0, 1.0])
 _SMALL = 1e-9
+"""Two motions have the same direction if their cosine is above 1 - this."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Macro:
-    """One straight motion, in the frame in which the contacts were given."""
+    """One straight motion, in the frame of the contact normals."""
 
     name: MacroName
     direction: Array
     """Unit vector, (3,)."""
     makes: tuple[int, ...]
-    """The contacts that are closed when it ends, by number; of `depart` those that it opens."""
+    """Numbers of the contacts that the motion closes at its end; for `depart`, of those that it opens."""
     keeps: tuple[int, ...]
-    """The contacts made before, along which it goes."""
+    """Numbers of the contacts made before, which stay closed during the motion."""
     length_m: float | None = None
-    """How far it goes; None: until contact is felt."""
+    """Length of the motion; None: until contact is detected."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", copy_frozen(np.asarray(self.direction) + 0.0, 3))
@@ -51,33 +52,36 @@ class Macro:
 
     @property
     def guarded(self) -> bool:
-        """Whether it ends when contact is felt."""
+        """Whether the motion ends when contact is detected."""
         return not self.inserts and self.name != "depart"
 
 
 class Layer(NamedTuple):
-    """The contacts that one motion takes off, by their row numbers."""
+    """The contacts that one disassembly motion removes, by row number."""
 
     cone: Cone
-    """The cone of all contacts that are left before the motion."""
+    """The motions that all contacts left before this one admit."""
     breaks: tuple[int, ...]
+    """Contacts that the motion removes."""
     keeps: tuple[int, ...]
-    """Walls along which the motion goes."""
+    """Walls along which the motion goes; they stay closed."""
 
     @property
     def slides_out(self) -> bool:
-        """Nothing can be opened, but there is a direction along all walls: the part is drawn out until they end."""
+        """Whether no contact can open, so the part slides along all walls until they end; also true if locked."""
         return not self.cone.state.detaching
 
     @property
     def locked(self) -> bool:
+        """Whether the contacts admit no motion at all."""
         return not self.cone.state.detaching and not self.cone.state.maintaining
 
 
 def peel(rows: Array) -> tuple[Layer, ...]:
-    """The layers of contacts with these normals, (k, 3), from the one that comes off first; the last may be locked.
+    """Sort contacts with normals `rows`, (k, 3), into layers, from the one that disassembly removes first.
 
-    What can be opened is opened first, along walls that stay; walls on all sides are left at their end.
+    Contacts that can open come first, while the others stay closed. If none can open, all that are left make one layer.
+    That last layer may be locked.
     """
     left = np.arange(len(rows))
     layers = []
@@ -90,38 +94,41 @@ def peel(rows: Array) -> tuple[Layer, ...]:
 
 
 class StraightExit(NamedTuple):
-    """A straight way out."""
+    """A straight motion by which a part leaves the walls around its goal."""
 
     direction: Array
     """Unit vector of the motion outwards, (3,)."""
     length_m: float
-    """After which the part is free of the walls."""
+    """Distance after which the part is free of the walls."""
     free: bool
     """Whether nothing else is in the way."""
 
 
 _Out = Callable[[Array, tuple[int, ...]], StraightExit]
-"""Chooses how a part leaves between walls: the directions in which all stay closed, (m, 3), and the walls by number."""
+"""Chooses the exit of a part between walls.
+
+Arguments: orthonormal directions in which all walls stay closed, (m, 3); numbers of the walls.
+"""
 
 
 class Chain(NamedTuple):
-    """How a part comes into its contacts."""
+    """The macros by which a part comes into its contacts."""
 
     state: ContactState
-    """When all are made."""
+    """The contact state once all contacts are made."""
     macros: tuple[Macro, ...]
     way: StraightExit | None
-    """Along which it leaves walls; None if it is enclosed by none, or if it is locked."""
+    """The exit from enclosing walls; None if no walls enclose the part, or if it is locked."""
     locked: bool
-    """Whether no straight motion leads there."""
+    """Whether no straight motion leads into the contacts."""
 
 
 def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
     """The macros that make contacts with these normals.
 
     Args:
-        normals: From what rests into the free side of what moves, unit length, (k, 3), z upwards.
-        out: How the part would leave between walls.
+        normals: Unit normals from the resting part towards the moving one, (k, 3), z upwards.
+        out: Chooses the exit of the part between walls.
         slack: Sine of the angle within which a direction counts as along a wall.
     """
     layers = peel(normals)
@@ -140,9 +147,12 @@ def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
 
 
 def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
-    """The macros by which a part leaves the contacts of a chain: the same ways back, in reverse order.
+    """The macros by which a part leaves its contacts: the arrival's motions inverted, in reverse order.
 
-    A part that only rests on supports is simply lifted, which belongs to every transfer; that is no macro.
+    A final lift off supports alone is part of every transfer, so it is left out.
+
+    Args:
+        supports: Numbers of the contacts that carry the part.
     """
     back: list[Macro] = []
     for macro in reversed(arrival.macros):
@@ -150,6 +160,7 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
         length = macro.length_m
         last = back[-1] if back else None
         if last is not None and last.direction @ d > 1.0 - _SMALL:
+            # Consecutive motions in one direction become one; a known length wins over None.
             length = max((x for x in (last.length_m, length) if x is not None), default=None)
             back[-1] = Macro("depart", d, (*last.makes, *macro.makes), macro.keeps, length)
         else:
@@ -160,15 +171,21 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
 
 
 def _insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macro:
-    """The motion between walls: along an axis, with a floor at the end, or between two planes."""
+    """The insertion between the walls of a layer: a peg into a hole, into a slot with a bottom, or between two planes.
+
+    Args:
+        layers: All layers; with more than one, the slot has further contacts, such as its bottom.
+        way: The exit; the insertion goes the opposite way.
+    """
     name: MacroName = "insert-into"
+    # Only one direction is constrained: parallel planes rather than a hole.
     if layer.cone.state.constraining == 1:
         name = "insert-into-slot" if len(layers) > 1 else "insert-between"
     return Macro(name, -way.direction, layer.breaks, (), way.length_m)
 
 
 def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
-    """The guarded motions that close what can be opened: down onto what carries first, then sideways, one by one."""
+    """The guarded motions that close the contacts of a layer, one by one: down onto supports first, then sideways."""
     macros: list[Macro] = []
     left = layer.breaks
     closed_before = layer.keeps
@@ -179,6 +196,7 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
             return _together(normals, layer, macros, left)
         name: MacroName = "slide-to-contact" if macros else "move-to-contact"
         if layer.cone.state.constraining == 2:
+            # Walls in two directions: the motion ends at the bottom of a hole.
             name = "move-to-bottom"
         macros.append(Macro(name, -off, closed, closed_before))
         closed_before = (*closed_before, *closed)
@@ -187,7 +205,11 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
 
 
 def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int, ...]) -> list[Macro]:
-    """Motions of which the last closes what is left, too: turned where that would leave a wall, else one for all."""
+    """`macros` with the last one changed so that it also closes the contacts `left`.
+
+    If its direction would press into one of them, it turns to a direction that closes all evenly. If no such direction
+    exists, one macro closes all contacts of the layer.
+    """
     last = macros[-1]
     makes = (*last.makes, *left)
     off = -last.direction
@@ -199,19 +221,28 @@ def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int
 
 
 def _evenly_off(normals: Array, makes: Sequence[int], keeps: Sequence[int]) -> Array:
-    """The direction that opens some contacts best while others stay closed, (3,); zero if there is none."""
+    """The unit direction, (3,), that opens `makes` the fastest while `keeps` stay closed; zero if there is none."""
     along = null_space(normals[list(keeps)]) if keeps else np.eye(3)
     return np.asarray(evenly_open(normals[list(makes)] @ along.T) @ along)
 
 
 def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tuple[Array, tuple[int, ...]]:
-    """In which direction some contacts open while those made before stay closed, and which: up, if that opens any and
-    leads into none."""
+    """The direction, (3,), that opens the next contacts while those made before stay closed, and the numbers of these.
+
+    Straight up is preferred if that opens a contact and presses into none. Otherwise the normal of a contact is taken,
+    the most upward ones first. The result is (zero, ()) if nothing can open.
+
+    Args:
+        left: Numbers of the contacts not made yet.
+        along: Orthonormal basis of the directions in which earlier contacts stay closed, (m, 3).
+        slack: Sine of the angle within which a direction counts as along a wall.
+    """
     up = _along(UP, along)
     opened = normals[list(left)] @ up
     carried = tuple(i for i, rate in zip(left, opened, strict=True) if rate > slack)
     if up[2] > 0.5 and carried and (opened >= -slack).all():
         return up, carried
+    # Normals with z below 0.5 rank alike, in their given order.
     for i in sorted(left, key=lambda i: -max(0.5, round(float(normals[i] @ UP), 6))):
         off = _along(normals[i], along)
         if off.any():
@@ -220,7 +251,7 @@ def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tu
 
 
 def _along(direction: Array, along: Array) -> Array:
-    """The part of a direction that lies in the span of an orthonormal basis, (m, 3), as a unit vector, or zero."""
+    """The projection of a direction, (3,), onto the span of orthonormal rows, (m, 3), as unit vector; zero if tiny."""
     within = direction if len(along) == 3 else along.T @ (along @ direction)
     size = float(np.linalg.norm(within))
     if size < 1e-6:

@@ -1,8 +1,4 @@
-"""Operations in terms of macros: the contact states before and after each, and the macros between them.
-
-States and macros are those of the nominal poses; a plan with other motion parameters has the same macros in the same
-directions of its parts, so that a minor change is made by replacing one part of the plan.
-"""
+"""Describe each operation of a plan by macros: how its part leaves its old contacts and comes into the new ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,20 +16,20 @@ from apo_bench.planning.insertion.states import (
 @final
 @dataclass(frozen=True, eq=False)
 class OperationMacros:
-    """One operation, in terms of macros."""
+    """The macros of one operation, with the contact states before and after."""
 
     operation: int
     """Counted from 0."""
     main: str
     carries: tuple[str, ...]
     before: Arrival
-    """How the part would come to where it is taken from: undoing the operation does that."""
+    """Arrival of the part at the place that it leaves; its `departs` are executed."""
     after: Arrival
-    """How it comes to its goal."""
+    """Arrival of the part at its goal."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The macros in their order, such as `depart`, `move-to-contact`."""
+        """The macros in their order of execution, such as `depart`, `move-to-contact`."""
         return tuple(macro.name for macro in (*self.before.departs, *self.after.macros))
 
 
@@ -44,21 +40,22 @@ def understand(
     stated: Sequence[Preference] = (),
     angle_rad: float = ANGLE_RAD,
 ) -> tuple[OperationMacros, ...]:
-    """Every operation.
+    """The macros of every operation, in order.
 
     Args:
         start: Poses before the first operation, z upwards, [m].
-        goals: (n, 4, 4), in the same frame, [m].
-        stated: Lines of attach to be preferred, each in the frame of its main part; one that leads through a contact
-            is not.
-        angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
+        goals: (n, 4, 4), target poses of the main parts, in the same frame, [m].
+        stated: Preferred lines of attach, one per operation, each in the frame of its main part. A direction that leads
+            through a contact is ignored. Empty: none is stated.
+        angle_rad: Faces within this angle are parallel; larger than rounding if the goals were observed.
     """
     stages = (start, *compute_placements(assembly, start, goals))
     lines = tuple(stated) or (ANY,) * len(assembly)
     understood: list[OperationMacros] = []
-    put: dict[str, int] = {}
+    put: dict[str, int] = {}  # main part -> its latest operation
     for k, operation in enumerate(assembly.operations):
         was = _held_by(assembly, put.get(operation.main), operation.moves)
+        # A part that was attached by an earlier operation leaves on the same line.
         back = ANY if was is None else understood[was].after.line.stated
         before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
@@ -68,7 +65,12 @@ def understand(
 
 
 def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
-    """The operation `was`, out of whose contacts a part must be brought; None if all of them move along."""
+    """`was`, if the contacts of that operation hold the part back; None if it has none, or all of them move along.
+
+    Args:
+        was: Latest operation that placed the part; None if there was none.
+        moved: The parts that move now.
+    """
     if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
         return None
     return was

@@ -1,8 +1,8 @@
-"""Contact states: which infinitesimal motions the contacts of a part admit, by one linear programme.
+"""Contact states: classify the infinitesimal motions that the contacts of a part admit, by one linear programme.
 
-Every contact normal n, from what rests into the free side of what moves, admits the motions with n x >= 0. Directions
-in which all of them stay closed are *maintaining*, those that only open some *detaching*, all others *constraining*;
-for translations the three numbers add up to 3, which leaves ten states. So do rows of six numbers (screws).
+A contact normal n, from the resting part towards the moving one, admits the motions with n x >= 0. A direction in which
+all contacts stay closed is *maintaining*, one that only opens some is *detaching*, any other is *constraining*. For
+translations the three numbers add up to 3, which leaves ten states. Rows of six numbers (screws) are classified alike.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from apo_bench.geometry import Array, freeze
 
 ANGLE_RAD = 1e-3
-"""Directions nearer than this to each other, or to being opposite, are the same where poses are exact."""
+"""Directions within this angle are parallel (or opposite) if poses are exact."""
 _RANK = 1e-4
-"""Singular values below this part of the largest are zero."""
+"""Singular values below this share of the largest count as zero."""
 _FASTEST = 1e3
 """Bound of the components of a motion that opens contacts at unit speed: a narrower cone counts as flat."""
 _LENGTH_M = 0.04
-"""Turns are counted by how far they move a point at this distance, so that rows have one unit."""
+"""Rotations count by the motion of a point at this distance, so that all entries of a screw are lengths."""
 STATE_LETTERS = {
     (3, 0, 0): "S",
     (2, 1, 0): "A",
@@ -34,11 +34,14 @@ STATE_LETTERS = {
     (0, 1, 2): "H",
     (0, 0, 3): "I",
 }
-"""The ten states of translation, by decreasing freedom: S in the air, A on a plane, E in a through hole, I captured."""
+"""(maintaining, detaching, constraining) -> letter of a state of translation.
+
+By decreasing freedom; for example S: in the air, A: on a plane, E: in a through hole, I: captured.
+"""
 
 
 class ContactState(NamedTuple):
-    """Degrees of freedom of each kind."""
+    """Numbers of maintaining, detaching and constraining degrees of freedom."""
 
     maintaining: int
     detaching: int
@@ -50,7 +53,7 @@ class ContactState(NamedTuple):
         return STATE_LETTERS.get((self.maintaining, self.detaching, self.constraining), "")
 
     def __str__(self) -> str:
-        """`D (1,1,1)`."""
+        """The letter and the three numbers, such as `D (1,1,1)`."""
         return f"{self.letter} ({self.maintaining},{self.detaching},{self.constraining})".strip()
 
 
@@ -62,7 +65,7 @@ class Cone:
     rows: Array
     """N, (k, n)."""
     detachable: NDArray[np.bool_]
-    """(k,): contacts that some admissible motion opens; the others are equations."""
+    """(k,): whether some admissible motion opens the contact; all others stay closed (N x = 0)."""
     direction: Array
     """A unit motion that opens all of those at once, (n,); zero if there are none."""
     state: ContactState
@@ -71,15 +74,15 @@ class Cone:
         freeze(self, rows=(None, None), direction=(self.rows.shape[1],))
 
     def admits(self, motion: Array, slack: float = ANGLE_RAD) -> bool:
-        """Whether a unit motion, (n,), closes in on nothing."""
+        """Whether a unit motion, (n,), closes in on no contact by more than `slack`."""
         return bool((self.rows @ motion >= -slack).all())
 
 
 def classify(rows: Array) -> Cone:
-    """The cone of contacts with these rows, (k, n), and its state.
+    """Classify the contacts with normals or screws `rows`, (k, n): the cone of admissible motions, and its state.
 
-    The programme asks for a motion that opens as many contacts as it can: max sum s, N x >= s, 0 <= s <= 1. Motions
-    that open single contacts add up to one that opens all that can be opened, so every s is 0 or 1.
+    The linear programme seeks a motion that opens as many contacts as possible: max sum s, N x >= s, 0 <= s <= 1.
+    Motions that open single contacts add up to one that opens all that can open, so every s is 0 or 1.
     """
     n = rows.shape[1]
     if not len(rows):
@@ -88,6 +91,7 @@ def classify(rows: Array) -> Cone:
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
     opens, x = _open_rows(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
+    # Motions along all contacts; directions across contacts that cannot open; the rest is detaching.
     maintaining = n - row_rank(rows)
     constraining = row_rank(rows[~detachable])
     return Cone(rows, detachable, x, ContactState(maintaining, n - maintaining - constraining, constraining))
@@ -95,7 +99,11 @@ def classify(rows: Array) -> Cone:
 
 @lru_cache(maxsize=1024)
 def _open_rows(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
-    """The programme for rows (k, n): which are opened, (k,), by what unit motion, (n,)."""
+    """Solve the programme of `classify`; the rows come as bytes so that the result can be cached.
+
+    Returns:
+        (opens, x): which rows open, (k,), and the unit motion that opens them, (n,), zero if none opens.
+    """
     from scipy.optimize import linprog
 
     N = np.frombuffer(rows).reshape(k, n)
@@ -107,14 +115,16 @@ def _open_rows(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
         bounds=[(-_FASTEST, _FASTEST)] * n + [(0.0, 1.0)] * k,
         method="highs",
     )
-    opens = optimum.x[n:] > 0.5
+    opens = optimum.x[n:] > 0.5  # every s is 0 or 1
     x = optimum.x[:n] if opens.any() else np.zeros(n)
     return opens, x / max(float(np.linalg.norm(x)), 1e-300)
 
 
 def evenly_open(rows: Array) -> Array:
-    """The motion, (n,), of components up to 1, that opens contacts with these rows, (k, n), the fastest, counting the
-    slowest of them; as a unit vector, or zero if none opens all."""
+    """The unit motion, (n,), that opens contacts `rows`, (k, n), evenly: the slowest opens as fast as possible.
+
+    The programme is max t, N x >= t, |x_i| <= 1. The result is zero if no motion opens all contacts.
+    """
     from scipy.optimize import linprog
 
     k, n = rows.shape
@@ -131,7 +141,7 @@ def evenly_open(rows: Array) -> Array:
 
 
 def row_rank(rows: Array) -> int:
-    """How many rows, (k, n), are independent."""
+    """Number of independent rows of (k, n)."""
     if not len(rows):
         return 0
     sizes = np.linalg.svd(rows, compute_uv=False)
@@ -139,18 +149,19 @@ def row_rank(rows: Array) -> int:
 
 
 def null_space(rows: Array) -> Array:
-    """An orthonormal basis of the motions that keep every contact closed, (m, n)."""
+    """An orthonormal basis, (m, n), of the motions that keep all contacts `rows`, (k, n), closed."""
     if not len(rows):
         return np.eye(rows.shape[1])
     return np.linalg.svd(rows)[2][row_rank(rows) :]
 
 
 def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
-    """Unit normals, (k, 3), of which those within an angle of an earlier one, or of its opposite, become that.
+    """Unit normals, (k, 3), in which nearly parallel ones are exactly parallel.
 
-    Between two walls a part is held; between two that are observed a little askew it would seem to be in a wedge.
+    A normal within `angle_rad` of an earlier one, or of its opposite, takes that direction and keeps its own sign. Two
+    observed walls of a slot would otherwise form a wedge, which holds the part less than a slot does.
     """
-    axes: list[Array] = []
+    axes: list[Array] = []  # directions taken so far, up to sign
     snapped = np.empty_like(normals)
     for i, n in enumerate(normals):
         near = [a for a in axes if np.linalg.norm(np.cross(a, n)) < np.sin(angle_rad)]
@@ -162,23 +173,23 @@ def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
 
 
 class Screw(NamedTuple):
-    """The state of a part that may also turn."""
+    """The contact state of a part that may also rotate."""
 
     all: ContactState
     """The state in all six degrees of freedom."""
     translation: ContactState
     rotation: ContactState
-    """What is left of `all` when translation is taken out."""
+    """`all` less `translation`; the three numbers add up to 3."""
 
 
 def screw_state(points: Array, normals: Array) -> Screw:
-    """The state of a part that is touched at points.
+    """The contact state, with rotations, of a part that is touched at points.
 
     Args:
         points: Corners of the contacts, (k, 3), [m], any frame.
-        normals: From what rests into the free side of what moves, (k, 3), one for each point.
+        normals: Unit normals from the resting part towards the moving one, (k, 3), one per point.
     """
-    # One row (p x n / L, n) per point, (k, 6): how fast a twist (L w, v) about the middle opens it.
+    # One row (p x n / L, n) per point, (k, 6): the speed at which a twist (L w, v) about the mean point opens it.
     arms = points - points.mean(axis=0) if len(points) else points
     everything = classify(np.hstack([np.cross(arms, normals) / _LENGTH_M, normals])).state
     translation = classify(np.unique(normals, axis=0)).state

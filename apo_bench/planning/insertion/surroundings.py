@@ -1,4 +1,4 @@
-"""What a part touches when it is moved: at its side, below it, later; what that asks of the motion."""
+"""Parts and faces around a motion: slide directions, slow stretches, hole entrances, later walls, neighbours."""
 
 import numpy as np
 
@@ -15,19 +15,27 @@ from apo_bench.geometry import Array, Face, measure_extent
 from apo_bench.planning.insertion.arrival import Arrival
 
 _SLOW_M = 0.003
+"""Least length of the slow stretch before the goal."""
 _STRAIGHT = 1e-9
+"""A slide goes straight at its face if the cosine to the normal is below this - 1."""
 WALL_MARGIN_M = 0.002
+"""A motion is slow from this far before the walls of an insertion begin."""
 OVER_M = 0.02
-"""Room between what is carried and what it is carried over."""
+"""Gap between carried parts and the parts below them."""
 
 
 def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tuple[Array, ...]:
-    """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are assumed to be."""
+    """The level directions of `slide-to-contact`, (3,) each, world frame, towards the faces at their assumed poses.
+
+    Args:
+        poses: Of every part, as assumed by the robot; they may differ from those of the arrival.
+    """
     sides: list[Array] = []
     for macro in arrival.macros:
         if macro.name == "slide-to-contact":
             first = arrival.touched[macro.makes[0]]
             side = -_now(assembly, arrival, macro.makes[0], poses)
+            # A slanted slide keeps the planned direction in the frame of the part.
             if first.normal @ macro.direction > -1.0 + _STRAIGHT:
                 side = poses[arrival.main][:3, :3] @ arrival.own(macro.direction)
             if abs(side[2]) < 0.5:
@@ -36,9 +44,10 @@ def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tupl
 
 
 def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
-    """A normal of what is touched, (3,), world, where the parts are assumed to be."""
+    """The normal of touched contact i, (3,), world frame, at the assumed poses."""
     contact = arrival.touched[i].contact
     rests = arrival.touched[i].rests
+    # A round contact has several normals: the position of contact i among those.
     place = sum(each.contact == contact for each in arrival.touched[:i])
     return find_touched_contacts(assembly, [contact], [of.part for of in contact if of.part != rests], poses)[
         place
@@ -51,7 +60,13 @@ def _walls(arrival: Arrival) -> tuple[Contact, ...]:
 
 
 def slow_before(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> float:
-    """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
+    """Distance before the goal at which a motion from above becomes slow, [m].
+
+    That is just before the walls of an insertion begin, else `_SLOW_M` above the floor.
+
+    Args:
+        way: Unit vector of the motion, (3,), world frame.
+    """
     depth = _SLOW_M
     for contact in _walls(arrival):
         depth = max(depth, _reach(assembly, contact, poses, way) + WALL_MARGIN_M)
@@ -59,7 +74,7 @@ def slow_before(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) 
 
 
 def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> float:
-    """How much of a way the faces of a contact have in common, [m]; 0 if nothing."""
+    """Length along `way` over which both faces of a contact overlap, [m]; 0 if they do not."""
     if assembly.is_round(contact):
         ends = [list_outline_points(assembly, of, poses) @ way for of in contact]
         return max(0.0, float(min(end.max() for end in ends) - max(end.min() for end in ends)))
@@ -68,16 +83,23 @@ def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> fl
 
 
 def mouths(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
-    """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
+    """Distances before the goal at which walls of the insertion begin, [m], the largest first.
+
+    Args:
+        way: Unit vector of the motion towards the goal, (3,), world frame.
+    """
     return tuple(
         sorted({measure_entrance_depth(assembly, *contact, poses, way) for contact in _walls(arrival)}, reverse=True)
     )
 
 
 def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
-    """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
+    """Normals, (3,) each, of the faces of a part that later operations bring into contact.
 
-    Of a round face two directions across its axis. Only those before the part is moved by itself again.
+    Operations after the part itself is moved again do not count. A round face gives two directions across its axis.
+
+    Args:
+        k: The operation after which to look, counted from 0.
     """
     walls = list[Array]()
     for later, operation in enumerate(assembly.operations[k + 1 :], start=k + 1):
@@ -88,18 +110,18 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
 
 
 def own_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
-    """Normals of a part's faces, (3,) each, that touch something in an operation; of a round face two directions."""
+    """Normals, (3,) each, of the faces of a part that have contacts in operation k; a round face gives two."""
     faces = [assembly.face_of(of) for contact in assembly.operations[k].contacts for of in contact if of.part == part]
     return [n for face in faces for n in ([face.normal] if isinstance(face, Face) else face.frame[:3, :2].T)]
 
 
 def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
-    """What the moved part touches."""
+    """Parts with a contact in `contacts`, without the moved ones."""
     return {of.part for contact in contacts for of in contact} - set(moved)
 
 
 def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
-    """The top of what stands, and the bottom of what moves, [m]."""
+    """Height of the top of all resting parts (0 if lower), and of the bottom of the moved parts, [m]."""
     ends = {
         part: np.add(measure_extent(solid.pieces, poses[part][2, :3]), poses[part][2, 3]).tolist()
         for part, solid in assembly.solids.items()

@@ -1,1 +1,1 @@
-"""Failure prediction: whether a plan will fail, where and why, before anything moves."""
+"""Failure prediction: where and why a plan will fail, computed before the robot moves."""

@@ -1,6 +1,7 @@
-"""Failure prediction: whether a plan will fail, where and why, from the plan, the sizes of the parts and the arm.
+"""Failure prediction: find the first operation of a plan that will fail, from the plan, the part sizes and the arm.
 
-What is looked at stands in `prediction/measures.py`; what the arm does not reach comes before all but an unstable goal.
+`prediction/measures.py` computes the compared quantities. An arm that cannot reach takes precedence over all of them
+but an unstable goal.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,8 @@ from apo_bench.planning.prediction.measures import ArmMove, MeasureCode, measure
 from apo_bench.records import Thresholds
 
 ARM_CODES = ("unreachable_start", "unreachable", "gripper_room", "tip_error")
-"""Of what another arm could do."""
+"""Failures that depend on the arm: another arm could execute the plan."""
+# Reason of `ArmMove.refused` -> sentence.
 _OUT_OF_REACH = MappingProxyType(
     {
         "unreachable_start": "the arm does not reach the part where it is taken",
@@ -27,7 +29,7 @@ _OUT_OF_REACH = MappingProxyType(
 @final
 @dataclass(frozen=True)
 class Prediction:
-    """What a plan says about itself."""
+    """The first predicted failure of a plan, or that every operation should fit."""
 
     fails: bool
     operation: int | None
@@ -35,10 +37,10 @@ class Prediction:
     code: MeasureCode | Literal["ok", "unreachable_start", "unreachable"]
     sentence: str
     size_mm: float | None
-    """`residual`, `tip_error`: the |e| that is too large; `interference`, `gripper_room`: the depth; `ok`: the largest
-    |e| of a contact that enters; None for an unstable goal, what would lean, and what is out of reach."""
+    """`residual`, `tip_error`: the |e| that exceeds its limit. `interference`, `gripper_room`: the penetration depth.
+    `ok`: the largest |e| of an insertion contact. None: unstable goal, leaning part, or out of reach."""
     mendable: bool = False
-    """Whether it may fit if directions are changed that contacts leave free."""
+    """Whether moving target poses along free directions of the contacts may prevent the failure."""
 
 
 def predict(
@@ -48,23 +50,28 @@ def predict(
     attach: Sequence[Attach] = (),
     arm: Sequence[ArmMove] = (),
 ) -> Prediction:
-    """The first operation of the schedule that will fail.
+    """Predict the first operation of the schedule that will fail.
 
-    An unstable goal comes before everything else, and then what is out of reach, since a plan with one is not begun.
+    An unstable goal is reported first, then an unreachable pose, since such a plan is not started.
 
     Args:
-        clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, a
-            shaft in its hole by what the radii leave, too, others by `support_mm`; parts that should not touch may be
-            as deep in each other as the judge lets one be pushed, `pushed_mm`, but only `fit_margin_mm` what carries
-            others, which would shift on it, and not at all what comes down to where a level way in begins, and would
-            stand there on another part.
-        attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
-        arm: What an arm makes of each operation; without it any arm will do.
+        clearance_mm: Clearance per side of the parts. The errors that `thresholds` allow:
+
+            - insertion contacts: `clearance_mm` + `fit_margin_mm`, for a shaft also the difference of the radii;
+            - other contacts: `support_mm`;
+            - depth in a part without a contact: `placed_part_shift_mm`, or `fit_margin_mm` if the moved part carries
+              others, which would shift on it;
+            - depth at the beginning of a level line: none, since the part would come to stand on another one.
+        attach: The line of attach of each operation. Without it every insertion contact counts in all directions, and
+            interference is checked at the goals alone.
+        arm: The motion of an arm in each operation; empty: an arm that reaches everything without error.
     """
     worst_mm = 0.0
     refused = next((move for move in arm if move.refused is not None), None)
     for _, alike in groupby(
-        measures(plan, clearance_mm, thresholds, attach, arm=arm), lambda each: (each.operation, each.kind)
+        # Of consecutive measures of one operation and one kind the largest counts.
+        measures(plan, clearance_mm, thresholds, attach, arm=arm),
+        lambda each: (each.operation, each.kind),
     ):
         worst = max(alike, key=lambda each: each.size)
         if refused is not None and worst.kind != "falls":
@@ -72,6 +79,7 @@ def predict(
         if worst.exceeded:
             sentence = _sentence(plan, worst.operation, worst.why)
             size_mm = None if worst.kind in ("falls", "leans") else float(worst.size)
+            # Misaligned contacts and tip errors do not change along free directions.
             mendable = worst.kind not in ("fit", "side", "own", "tip")
             return Prediction(True, worst.operation, worst.code, sentence, size_mm, mendable)
         if worst.kind == "fit":
@@ -80,6 +88,7 @@ def predict(
 
 
 def _out_of_reach(plan: Plan, move: ArmMove) -> Prediction:
+    """The prediction for a motion that the arm refuses."""
     assert move.refused is not None
     limit = f": its joint '{move.at_limit}' is at its limit" if move.at_limit else ""
     sentence = _sentence(plan, move.operation, _OUT_OF_REACH[move.refused] + limit)
@@ -87,4 +96,5 @@ def _out_of_reach(plan: Plan, move: ArmMove) -> Prediction:
 
 
 def _sentence(plan: Plan, operation: int, why: str) -> str:
+    """The failure with its operation, counted from 1, and main part."""
     return f"operation {operation + 1} ({plan.assembly.operations[operation].main}) will fail: {why}"

@@ -1,4 +1,4 @@
-"""How deep a plan puts parts into one another: at the goal, on the way in, and where that way begins."""
+"""Penetration depths between parts of a plan: at the goal, along the line of attach, and above its beginning."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,21 +18,21 @@ from apo_bench.geometry import (
 from apo_bench.planning.insertion.attach import Attach
 
 _SPACING_M = 0.02
-"""Largest distance between two places on the way in that are examined, up to `_MOST` places."""
+"""Largest spacing of the examined positions on the line of attach, unless that takes more than `_MOST`."""
 _MOST = 8
-"""Places on the way in that are examined, at most."""
+"""Largest number of examined positions on the line of attach."""
 _ABOVE_M = np.linspace(0.0, 0.04, 9)
-"""Heights above the begin of a level way in that are examined, (9,), since a part comes down there."""
+"""Examined heights above the beginning of a level line, (9,), [m]; the part descends there."""
 _LEVEL = 0.5
-"""A way in is level if its cosine with the vertical is smaller."""
+"""A line of attach is level if its cosine with the vertical is smaller."""
 FAR_M = 0.01
-"""Parts that are further apart count as so far apart."""
+"""Larger distances between parts count as this one."""
 Solids = Mapping[str, Solid]
 
 
 @remember
 def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
-    """The parts as they are made, fit faces receded; the same ones each time."""
+    """The parts as manufactured: fit faces recede by `clearance_mm`. Cached per assembly and clearance."""
     made = {
         name: replace(solid, pieces=shrink_pieces(solid, clearance_mm * 1e-3))
         for name, solid in assembly.solids.items()
@@ -41,14 +41,16 @@ def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
 
 
 def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
-    """How deep each part that moves comes into each one that rests and that it should not touch, (r,) each, [m].
+    """Penetration of each moving part into each resting part that it has no contact with, (r,) each, [m].
 
     Args:
-        planned: Every part where the plan has it after the operation, (4, 4), or where r robots bring it, (r, 4, 4).
-        how: The way in; without it the goal alone is looked at.
+        operation: The operation that moves the parts.
+        planned: Pose of every part after the operation, (4, 4), or (r, 4, 4) for r robots with different errors.
+        how: The line of attach; None: only the goal is examined.
+        physical: From `physical_solids`.
 
     Returns:
-        Negative: how far off they stay.
+        One array per pair of parts: the deepest over the examined positions; a negative depth is a distance.
     """
     touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
     back = _way_back(planned[operation.main], how)
@@ -57,12 +59,12 @@ def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, phys
 
 
 def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
-    """How deep each part comes into each one that rests while it comes down to where a level way in begins, [m].
+    """Penetration of each moving part into each resting part while it descends to the beginning of a level line, [m].
 
-    Parts that it touches in the end count, too: there it has not come into them yet.
+    Parts that are in contact at the goal count, too, since the contact is not made yet.
 
     Returns:
-        As `depths_on_way`; `-FAR_M` of any other way in.
+        As `depths_on_way`; `-FAR_M` if the line is not level, or there is none.
     """
     pairs = _pairs(operation, physical)
     goals = planned[operation.main].reshape(-1, 4, 4)
@@ -79,19 +81,22 @@ def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, 
 
 
 def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
+    """(moving part, resting part) of all combinations."""
     return [(a, b) for a in operation.moves for b in physical if b not in operation.moves]
 
 
 def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array:
-    """The deepest intrusion over all displacements (r, k, 3) of a, of each of r robots, [m]; far off ones are skipped.
+    """The largest penetration of solid `a` into `b` over all displacements of `a`, (r,), [m]; at least `-FAR_M`.
 
     Args:
-        T_a, T_b: (4, 4), or (r, 4, 4).
+        T_a, T_b: World poses, (4, 4), or (r, 4, 4) of r alternatives.
+        shifts: Displacements of `a`, (r, k, 3), world frame, [m].
     """
     T_a, T_b = (np.broadcast_to(T, (len(shifts), 4, 4)) for T in (T_a, T_b))
     middle, radius = enclose_in_ball(a.pieces)
     places = (T_a[:, :3, :3] @ middle + T_a[:, :3, 3] - T_b[:, :3, 3])[:, None] + shifts
     seen_from_b = places @ T_b[:, :3, :3]
+    # Only displacements that bring the bounding ball of a near the bounding box of b are measured exactly.
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=2) < radius + FAR_M
     out = np.full(len(shifts), -FAR_M)
     for i in near.any(axis=1).nonzero()[0]:
@@ -102,7 +107,7 @@ def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array
 
 
 def _way_back(goal: Array, how: Attach | None) -> Array:
-    """From goals, (4, 4) or (r, 4, 4), back along the way in, (r, k, 3), world, [m]."""
+    """Displacements from goals, (4, 4) or (r, 4, 4), back along the line of attach, (r, k, 3), world frame, [m]."""
     goals = goal.reshape(-1, 4, 4)
     if how is None:
         return np.zeros((len(goals), 1, 3))

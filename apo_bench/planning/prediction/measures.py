@@ -1,15 +1,14 @@
-"""What a plan is measured by, operation by operation: how far something is off, and how far it may be.
+"""Measures of a plan, operation by operation: how large an error is, and how large it may be.
 
-A goal at which a part would not stand. Contacts that are planned further off than the judge allows: of faces that fit
-into one another, and of axes, those across the way in, since along it the robot goes on until it feels contact; of
-sides that are slid onto each other what stays open once one corner touches, since the slide does not turn the part; of
-supports none, since weight closes them however wrong the plan is. A part that stays where it does not stand on what
-lies below alone: it leans as far as clearances let it. Parts that are planned into one another where no contact is
-meant, at the goal or on the way in; of those that touch in the same operation the contacts have told, except where a
-level way in begins: there a part comes down next to all others.
-
-Where it is known what an arm makes of the plan, as plain numbers that somebody who knows the arm works out: whether
-its open gripper has room, and whether contacts that would be near enough still are with the error of its tip.
+- falls: at its goal the part would not stand.
+- fit: misalignment of insertion contacts across the line of attach. Along it the robot moves on until contact.
+- side: what stays open of a face once one corner touches, since a slide does not rotate the part. Supports have no
+  such measure: weight closes them, however large the error.
+- leans: without what lies above, the part would not stand, so it leans as far as clearances allow.
+- on_way, from_above: penetration without a contact, at the goal, along the line of attach, and above the beginning of a
+  level line. Parts that the operation brings into contact count only there, since their contacts cover the rest.
+- gripper, own, tip: penetration of the open gripper; error of the arm alone; misalignment with that error. They need
+  the motions of an arm (`ArmMove`), which the simulation computes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,34 +44,35 @@ Refused = Literal["unreachable_start", "unreachable"]
 @final
 @dataclass(frozen=True, eq=False)
 class ArmMove:
-    """One operation of a plan that is done, or undone, by an arm."""
+    """The motion of an arm in one operation, or in undoing it, as plain numbers."""
 
     operation: int
     """Counted from 0."""
     undo: bool = False
     refused: Refused | None = None
-    """Why it is not begun: there are no joint angles where the part is taken, or where it is put."""
+    """Why the plan is not started: no joint angles reach the pick pose, or the goal and its approach."""
     at_limit: str = ""
-    """The joint that stands at its limit there; empty where the arm is too short, or nothing is refused."""
+    """The joint at its limit in a refused pose; empty if the arm is too short, or nothing is refused."""
     struck: str = ""
-    """The part that the open gripper is deepest in, where it takes hold or lets go."""
+    """The part that the open gripper penetrates the deepest at grasp or release."""
     struck_mm: float = 0.0
+    """That depth."""
     sag: Array = field(default_factory=lambda: np.eye(4))
-    """Where the weight of what is held takes it, a displacement of the world, (4, 4), [m]."""
+    """Displacement of the held part by its weight, (4, 4), world frame, [m]."""
     beside_mm: float = 0.0
-    """How far the tip deviates from its line, moving, at most."""
+    """Largest deviation of the moving tip from its line."""
     margin_deg: float | None = None
-    """The least distance of a joint from its limits where the tip turns or stops; None where nothing is known of it."""
+    """Least distance of a joint from its limits at the key poses; None if unknown."""
 
 
 MeasureKind = Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
 MeasureCode = Literal["residual", "interference", "unstable_goal", "gripper_room", "tip_error"]
 _ACROSS = 0.5
-"""A face whose normal makes a smaller cosine with the way in is a wall along it."""
+"""A face is a wall along the line of attach if the cosine of its normal with the line is smaller."""
 _BESIDE_MM = 1e-3
-"""Parts that are less deep in each other only touch, whatever was rounded."""
+"""A smaller penetration is a touch; it absorbs rounding."""
 _ROUNDING_MM = 1e-9
-"""Lengths that differ by less are the same."""
+"""Lengths with a smaller difference are equal."""
 _CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
 _SAID: Mapping[MeasureKind, tuple[MeasureCode, str]] = MappingProxyType(
     {
@@ -96,21 +96,22 @@ _SAID: Mapping[MeasureKind, tuple[MeasureCode, str]] = MappingProxyType(
         ),
     }
 )
-"""What is measured -> the code of what is too much, and what is stated of it."""
+"""Kind of measure -> failure code, and its sentence with size and limit."""
 
 
 class Measure(NamedTuple):
-    """How far something is off, and how far it may be."""
+    """One error of a plan, and its limit."""
 
     operation: int
     """Counted from 0."""
     kind: MeasureKind
     size: float
-    """[mm], of parts that are apart negative; of what falls or leans, how much of the weight and its moments over 10 mm
-    nothing balances."""
+    """[mm]; negative for parts that are apart. `falls`, `leans`: the unbalanced share of the weight and of its moments
+    on a 10 mm arm."""
     allowed: float
+    """Largest size without a failure."""
     what: str = ""
-    """The part that a gripper would strike."""
+    """`gripper`: the part that the gripper would strike."""
 
     @property
     def exceeded(self) -> bool:
@@ -118,28 +119,28 @@ class Measure(NamedTuple):
 
     @property
     def code(self) -> MeasureCode:
-        """What is stated of it if it is too much."""
+        """The failure code if the size exceeds the limit."""
         return _SAID[self.kind][0]
 
     @property
     def why(self) -> str:
-        """`it would be 7.59 mm deep in another part, 1 mm are allowed`."""
+        """The sentence of the failure, such as `it would be 7.59 mm deep in another part, 1 mm are allowed`."""
         return _SAID[self.kind][1].format(self.size, self.allowed, what=self.what)
 
 
 class _Act(NamedTuple):
-    """One operation about to be done, alone."""
+    """One operation of the schedule, with the poses of all parts after it."""
 
     number: int
     """The operation, counted from 0."""
     alone: Assembly
-    """Without the other operations."""
+    """The assembly with this operation only."""
     planned: Poses
-    """Every part where the plan has it after the operation, or where each of several robots brings it."""
+    """Pose of every part after the operation by the plan, (4, 4), or by r robots with errors, (r, 4, 4)."""
     rests: Poses
-    """Every part where it will have come to rest."""
+    """The same once the parts have come to rest."""
     known: Meetings
-    """The contacts of all operations, with what is measured already."""
+    """Cache of the measured contacts of all operations."""
 
     @property
     def operation(self) -> Operation:
@@ -147,7 +148,7 @@ class _Act(NamedTuple):
 
 
 class DrawnMeasure(NamedTuple):
-    """A `Measure` of several draws of what is wrong with a robot."""
+    """One error of a plan for r draws of the robot's errors, with the limits."""
 
     operation: int
     kind: MeasureKind
@@ -158,7 +159,7 @@ class DrawnMeasure(NamedTuple):
     what: str = ""
 
     def one(self) -> Measure:
-        """Of a single draw."""
+        """The `Measure` of the first draw, which is the only one."""
         return Measure(self.operation, self.kind, float(self.size[0]), float(self.allowed[0]), self.what)
 
 
@@ -170,11 +171,13 @@ def measures(
     room_mm: float = 0.0,
     arm: Sequence[ArmMove] = (),
 ) -> Iterator[Measure]:
-    """Everything that a plan is measured by, the most important first; always the same things of one schedule.
+    """All measures of a plan, stability first, then operation by operation.
+
+    The sequence of kinds depends on the schedule only, not on the poses.
 
     Args:
-        room_mm: Centres of mass are looked at this far aside, too.
-        arm: As in `predict`; its reach is not measured.
+        room_mm: Stability is also checked with the centre of mass shifted by this distance to four sides.
+        arm: As in `predict`; reach is not measured here.
     """
     falls, of_acts = _as_planned(plan, clearance_mm, thresholds, tuple(attach), room_mm)
     yield from falls
@@ -188,7 +191,12 @@ def measures(
 def _as_planned(
     plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: tuple[Attach, ...], room_mm: float
 ) -> tuple[tuple[Measure, ...], tuple[tuple[_Act, tuple[Measure, ...]], ...]]:
-    """What falls, and what each operation is measured by without an arm, the fit first; a trial asks for it thrice."""
+    """The measures of a plan without an arm, cached, since a trial needs them three times.
+
+    Returns:
+        (falls, of_acts): one `falls` per operation; each operation with its other measures, of which the fit is the
+        first.
+    """
     acts = _acts(plan)
     physical = physical_solids(plan.assembly, clearance_mm)
     falls = [
@@ -199,6 +207,7 @@ def _as_planned(
     for act in acts:
         fit, side, *depths = (each.one() for each in _drawn(act, clearance_mm, thresholds, attach, physical))
         leans = list[Measure]()
+        # A part that is moved again later may lean until then.
         stays = not any(act.operation.main in later.moves for later in plan.assembly.operations[act.number + 1 :])
         if stays and clearance_mm > thresholds.fit_margin_mm:
             size = imbalance(act.known, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
@@ -215,11 +224,11 @@ def drawn_measures(
     arm: Sequence[ArmMove],
     brought: Sequence[Poses],
 ) -> Iterator[DrawnMeasure]:
-    """What a plan is measured by that robots with errors carry out, but for what falls or leans.
+    """The measures of a plan that robots with errors execute, without `falls` and `leans`.
 
     Args:
-        arm: As in `predict`; its reach is not measured.
-        brought: Every part when one is put, (r, 4, 4) by r robots, for each step of the schedule that puts one.
+        arm: As in `predict`; reach is not measured here.
+        brought: Poses of every part, (r, 4, 4) for r robots, after each step of the schedule that is not an undo.
     """
     physical = physical_solids(plan.assembly, clearance_mm)
     for act in _acts(plan, brought):
@@ -230,13 +239,14 @@ def drawn_measures(
 def _drawn(
     act: _Act, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach], physical: Solids
 ) -> Iterator[DrawnMeasure]:
-    """What an operation is measured by without an arm, but for what falls or leans; the fit is the first."""
+    """The measures of one operation without an arm and without `falls` and `leans`; the fit is the first."""
     k = act.number
     how = attach[k] if attach else None
     fit = _fit(act, how, clearance_mm, thresholds)
     same = np.ones_like(fit.size)
     yield fit
     yield DrawnMeasure(k, "side", _side_mm(act), thresholds.support_mm * same)
+    # A part that carries others would shift them, so it may penetrate less.
     deep_mm = thresholds.fit_margin_mm if act.operation.carries else thresholds.placed_part_shift_mm
     for depths_m in depths_on_way(act.operation, act.planned, how, physical):
         yield DrawnMeasure(k, "on_way", 1e3 * depths_m, deep_mm * same)
@@ -252,10 +262,10 @@ def _by_arm(
     thresholds: Thresholds,
     fit: DrawnMeasure,
 ) -> Iterator[DrawnMeasure]:
-    """What an operation is measured by once it is known what an arm makes of it.
+    """The measures of one operation that depend on the arm.
 
     Args:
-        fit: How well it fits without the arm.
+        fit: The fit without the errors of the arm.
     """
     same = np.ones_like(fit.size)
     how = attach[act.number] if attach else None
@@ -266,15 +276,19 @@ def _by_arm(
 
 
 def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> tuple[_Act, ...]:
-    """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along.
+    """The operations of the schedule, in order, with the poses after each; all contacts are measured in one call.
 
-    All contacts are measured in one call.
+    Undo steps only change poses. What an undone part carries moves with it.
+
+    Args:
+        brought: Poses of every part, (r, 4, 4), by robots with errors, one per step that is not an undo; empty: the
+            plan's.
     """
     acts = list[_Act]()
     known = Meetings(plan.assembly)
     given_poses = iter(brought)
     planned = rests = plan.start
-    origins = dict[int, tuple[Array, Array]]()
+    origins = dict[int, tuple[Array, Array]]()  # operation -> (planned, resting) pose of its main part before it
     for (k, undo), target in zip(plan.schedule, plan.step_poses, strict=True):
         operation = plan.assembly.operations[k]
         alone = replace(plan.assembly, operations=(operation,))
@@ -292,12 +306,15 @@ def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> tuple[_Act, ...]:
 
 
 def _put(alone: Assembly, before: Poses, goal: Array) -> Poses:
-    """All poses once the only operation has put its main part at a goal."""
+    """The poses of all parts after the only operation of `alone` has put its main part at `goal`, (4, 4)."""
     return compute_placements(alone, before, goal[None])[0]
 
 
 def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> DrawnMeasure:
-    """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
+    """The fit of one operation: misalignment of the insertion contact that exceeds its limit the most.
+
+    Per draw the size is the |e| across the line of attach, of nominal faces at the planned poses.
+    """
     lengths = clearance_mm, thresholds.fit_margin_mm, thresholds.support_mm
     entering = [contact for contact in act.operation.contacts if enters(act.alone, contact)]
     limits = [compute_deep_limit_mm(act.alone, contact, *lengths) for contact in entering]
@@ -306,10 +323,11 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
     worst = []
     for poses in alternatives:
         off = [_misfit_mm(act, contact, poses, how) for contact in entering]
-        sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
+        sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]  # pairs (size, limit); this one if nothing enters
         sides += [(deep, limit) for (deep, _), limit in zip(off, limits, strict=True)]
         most = max(sides, key=_excess)
-        # Faces may be at least as far apart as deep; how much farther takes a linear program, where it may matter.
+        # The limit for faces apart is at least that for faces deep. Its exact value takes a linear programme, which is
+        # solved only if the contact may be the worst.
         for contact, (_, apart), limit in zip(entering, off, limits, strict=True):
             if apart > limit:
                 if apart - limit <= _excess(most) + _ROUNDING_MM:
@@ -321,33 +339,42 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
 
 
 def _excess(side: tuple[float, float]) -> float:
-    """By how much a length is more than what is allowed."""
+    """Size less limit of a pair (size, limit)."""
     return side[0] - side[1]
 
 
 def _tip(
     act: _Act, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds, planned: DrawnMeasure
 ) -> Iterator[DrawnMeasure]:
-    """Of what enters: how far off the arm alone is, which play must take, and how far with what is planned wrong."""
+    """The errors of insertion contacts due to the arm: of the arm alone (`own`), and with those of the plan (`tip`).
+
+    Nothing is yielded if the arm has no error, or nothing is inserted.
+
+    Args:
+        planned: The fit without the errors of the arm.
+    """
     as_planned = not move.beside_mm and np.array_equal(move.sag, np.eye(4))
     if as_planned or not any(enters(act.alone, contact) for contact in act.operation.contacts):
         return
     moved = {part: move.sag @ act.planned[part] for part in act.operation.moves}
     off = _fit(act._replace(planned=MappingProxyType({**act.planned, **moved})), how, clearance_mm, thresholds)
+    # The arm alone must stay within the play; the plan's own errors may also use the margin.
     own = np.maximum(0.0, off.size - planned.size) + move.beside_mm
     yield DrawnMeasure(act.number, "own", own, np.maximum(off.allowed - thresholds.fit_margin_mm, 0.0))
     yield DrawnMeasure(act.number, "tip", off.size + move.beside_mm, off.allowed)
 
 
 def _misfit_mm(act: _Act, contact: Contact, poses: Poses, how: Attach | None) -> tuple[float, float]:
-    """How deep and how far apart a contact is across the way in at most, [mm]; of round faces, twice, how far apart the
-    axes are, across it.
+    """(deep, apart): the largest penetration and gap of a contact across the line of attach, [mm].
+
+    For two round faces both are the offset of the axes across the line.
     """
     way = None if how is None else poses[act.operation.main][:3, :3] @ how.direction
     (lie,) = act.known.measure([(contact, poses)])
     if classify_contact(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
         e, n = residual(act.alone, contact, lie, poses)
         if way is not None and abs(n @ way) >= _ACROSS:
+            # The face stops the motion along the line: contact ends it, whatever the planned error.
             return 0.0, 0.0
         return max(0.0, -1e3 * float(e.min())), max(0.0, 1e3 * float(e.max()))
     assert isinstance(lie, Mate)
@@ -356,20 +383,21 @@ def _misfit_mm(act: _Act, contact: Contact, poses: Poses, how: Attach | None) ->
 
 
 def _off_axis_m(lie: Mate, way: Array | None) -> float:
-    """How far apart the axes of two round faces are, or their walls, across the way in."""
+    """Offset of the axes (or walls) of two round faces across the line of attach `way`, [m]; in full without a line."""
     if way is None:
         return lie.gap_m
-    # Along the way the robot goes on until it feels contact, so only the part of each offset across it counts.
+    # Along the line the robot moves on until contact, so only the offset across it counts.
     beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
     return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
 
 
 def _side_mm(act: _Act) -> Array:
-    """Largest |e| of the sides that the operation slides onto others, once its part rests, of each draw, (r,)."""
+    """The largest |e| of the contacts that the operation slides onto, once the part rests, of each draw, (r,), [mm]."""
     touched = [contact for contact in act.operation.contacts if not enters(act.alone, contact)]
     found = residuals(act.known, touched, act.rests)
     worst = np.zeros(len(found))
     for i, contact in enumerate(touched):
         most = np.array([1e3 * np.abs(each[i][0]).max() for each in found])
+        # Weight closes supports, so they do not count.
         worst = np.maximum(worst, np.where(is_support(act.alone, contact, act.rests), 0.0, most))
     return worst

@@ -1,7 +1,7 @@
-"""Where a part comes to rest that is put down with a small error: what is found by touch ends in touch.
+"""Predict the rest pose of a part that is put down with a small error: supports and sides end in contact.
 
-Weight lays a part flat on what carries it. A part that is slid against another one stops at the first corner that
-touches and keeps its turn. Faces that fit into one another are left as they are planned, shafts in holes and cones too.
+Weight lays a part flat on its supports. A part that slides against a side stops at the first corner that touches, and
+keeps its rotation. Faces that fit into one another, shafts in holes and cones stay as planned.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,20 +23,21 @@ from apo_bench.assembly import (
 from apo_bench.geometry import Array, Face, Mate, RoundFace, pose
 
 _LEVEL = 0.5
-"""A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
+"""A face is a support if the cosine of its normal with the vertical is larger, else a side."""
 _ROUNDS = 10
-"""A shaft between two sides of a groove comes to rest on both, each time a little nearer."""
+"""Iterations for round supports: laying a shaft on one side of a groove, then on the other, converges."""
 
 
 def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Poses:
-    """The poses of all parts once what the operation moves has come to rest, as one body.
+    """The poses of all parts once the moved ones, as one body, have come to rest.
 
     Args:
-        poses: Every part, what the operation moves where it is brought to, world frame, [m]; several alternatives,
-            (r, 4, 4), come to rest at once.
+        poses: Of every part, the moved ones where the robot releases them, world frame, [m]; (4, 4), or (r, 4, 4) for r
+            alternatives, which come to rest independently.
     """
     touched = [contact for contact in operation.contacts if not enters(assembly, contact)]
     carries = {contact: np.asarray(is_support(assembly, contact, poses)) for contact in touched}
+    # A contact that is a support in some alternatives only: each alternative is solved alone.
     if any(each.any() != each.all() for each in carries.values()):
         alone = [resting_poses(assembly, operation, each) for each in list_alternatives(poses)]
         return MappingProxyType({part: np.array([each[part] for each in alone]) for part in poses})
@@ -45,29 +46,30 @@ def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Pos
     for contact in supports * (_ROUNDS if any(map(assembly.is_round, supports)) else 1):
         _displace(now, operation, _flat(assembly, contact, now))
     for contact in (contact for contact in touched if contact not in supports):
+        # Sides: move until the first corner touches.
         first = [n * e.min() for ((e, n),) in residuals(Meetings(assembly), [contact], now)]
         _displace(now, operation, _shift(np.array(first).reshape(*_lead(now, operation), 3)))
     return MappingProxyType(now)
 
 
 def enters(assembly: Assembly, contact: Contact) -> bool:
-    """Whether a face goes into another one, so that play decides and nothing is found by touch."""
+    """Whether a contact is an insertion: its error is bounded by the play, and no guarded motion closes it."""
     on_plane = any(isinstance(assembly.face_of(of), Face) for of in contact)
     return assembly.is_fit(contact) or not on_plane
 
 
 def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> list[tuple[tuple[Array, Array], ...]]:
-    """e of each contact at the corners of its overlap, (k,), [m], positive where the faces are apart, and the normal.
+    """The errors e of contacts at their overlap corners, (k,), [m], positive if the faces are apart; and normals.
 
-    Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
-    shaft on a plane the ends of the line of contact. The normal, (3,), is that of the flat face, world.
+    Flat faces that do not overlap in an area are measured at the corners of the whole environment face. A shaft on a
+    plane is measured at the ends of the line of contact. The normal, (3,), is that of the flat face, world frame.
 
     Args:
-        known: The contacts, with what is measured already.
-        poses: World frame, [m]; there may be several alternatives, (r, 4, 4).
+        known: Cache of measured contacts.
+        poses: World frame, [m], (4, 4), or (r, 4, 4) for r alternatives.
 
     Returns:
-        For each alternative those of the contacts.
+        For each alternative the pairs (e, normal), one per contact.
     """
     alternatives = list_alternatives(poses)
     lies = iter(known.measure((contact, each) for each in alternatives for contact in contacts))
@@ -75,33 +77,39 @@ def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> lis
 
 
 def residual(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> tuple[Array, Array]:
-    """`residuals` of one contact whose faces lie so to each other."""
+    """(e, normal) of one contact, as in `residuals`, from the measured position of its faces.
+
+    Args:
+        lie: The contact as measured by `Meetings`.
+    """
     m, e = contact
     if isinstance(lie, Mate):
         up = _up(assembly, contact, poses)
+        # The normal points the other way if the moved part has the round face.
         return lie.off @ up, up * (-1.0 if m.face in assembly.solids[m.part].rounds else 1.0)
     T_m = poses[m.part]
     plane = assembly.face(m).plane
     corners = lie.corners if len(lie.corners) else pose.apply(poses[e.part], assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
+    # Distance of the corners from the plane of the moved face, (k,), n x + d.
     return (corners - T_m[:3, 3]) @ n + plane[3], n
 
 
 def is_support(assembly: Assembly, contact: Contact, poses: Poses) -> NDArray[np.bool_]:
-    """Whether weight closes the contact, (*,)."""
+    """Whether weight closes the contact, (*,), one per alternative."""
     return np.asarray(np.abs(_up(assembly, contact, poses)[..., 2]) > _LEVEL) & (not enters(assembly, contact))
 
 
 def _up(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
-    """The normal of the flat face of a contact, that of the second part if both are, (*, 3), world."""
+    """The normal of the flat face of a contact, (*, 3), world frame; of the environment's if both are flat."""
     flat = next(of for of in reversed(contact) if isinstance(assembly.face_of(of), Face))
     return np.asarray(poses[flat.part][..., :3, :3] @ assembly.face(flat).normal)
 
 
 def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
-    """The displacement of the world that lays the manipulated face flat on the other one, (*, 4, 4).
+    """The world displacement that lays the moved face flat on the other one, (*, 4, 4).
 
-    The least turn, about the middle of the face, and then straight down or up.
+    It is the least rotation about the middle of the face, then a shift along the normal of the other face.
     """
     m, e = contact
     if assembly.is_round(contact):
@@ -116,7 +124,7 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
-    """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
+    """`_flat` of one alternative for a shaft on a plane, or a plane on a shaft: rotate to parallel, then shift."""
     touch = measure_contact(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
@@ -129,14 +137,14 @@ def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 
 def _across(a: Array, b: Array) -> Array:
-    """The direction across b that is nearest to a; a itself where it lies along b."""
+    """The unit vector perpendicular to b that is nearest to a; a itself if a is along b."""
     across = a - (a @ b) * b
     size = float(np.linalg.norm(across))
     return np.asarray(across / size) if size > 0.0 else a
 
 
 def _turn(a: Array, b: Array) -> Array:
-    """The least turn that takes directions, (*, 3), to other ones, about the origin, (*, 4, 4)."""
+    """The least rotations about the origin that take directions a to b, (*, 3) each, as (*, 4, 4)."""
     axis = np.cross(a, b)
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)
     turn = axis * np.divide(np.arcsin(np.minimum(1.0, sine)), sine, out=np.zeros_like(sine), where=sine > 0.0)
@@ -144,20 +152,20 @@ def _turn(a: Array, b: Array) -> Array:
 
 
 def _shift(d: Array) -> Array:
-    """The displacements by (*, 3), [m]."""
+    """Translations by d, (*, 3), [m], as (*, 4, 4)."""
     return pose.rigid(np.broadcast_to(np.eye(3), (*d.shape, 3)), d)
 
 
 def _place(T: Array, point: Array) -> Array:
-    """Where a point, (3,), of a frame at poses (*, 4, 4) is, (*, 3)."""
+    """The world positions, (*, 3), of a point, (3,), given in a frame at poses T, (*, 4, 4)."""
     return np.asarray(T[..., :3, :3] @ point + T[..., :3, 3])
 
 
 def _lead(poses: Mapping[str, Array], operation: Operation) -> tuple[int, ...]:
-    """How many alternatives there are of the poses of what an operation moves, if there are several."""
+    """The leading shape of the poses of the moved parts: (r,) for r alternatives, () for one."""
     return poses[operation.main].shape[:-2]
 
 
 def _displace(poses: dict[str, Array], operation: Operation, S: Array) -> None:
-    """Move all that the operation moves by a displacement of the world."""
+    """Displace the moved parts by S, (*, 4, 4), world frame, in place."""
     poses.update({part: S @ poses[part] for part in operation.moves})

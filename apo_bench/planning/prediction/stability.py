@@ -1,8 +1,7 @@
-"""Would a part stay where a plan puts it? Balance of weight by what lies below and above it.
+"""Static stability: whether contact forces balance the weight of a part at its planned goal.
 
-On parts that are boxes vertical forces act, at level faces. Where a part is of other pieces, forces act along the
-normals of its contacts, with friction where they carry weight: a wedge is held by a slope and
-a wall, a shaft by both sides of a groove, a plug by its seat.
+Between boxes, vertical forces act at level faces. For all other pieces, forces act along the contact normals, with
+friction where they carry weight: a wedge held by a slope and a wall, a shaft in a groove, a plug in its seat.
 """
 
 from collections.abc import Iterable
@@ -14,30 +13,31 @@ from apo_bench.assembly import Assembly, Contact, Meeting, Meetings, Operation, 
 from apo_bench.geometry import Array, Face, Overlap, RoundFace, all_boxes, find_direction_across, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
-"""A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
+"""A face between boxes carries weight if the |z| of its normal is at least this, else it is a wall."""
 _FRICTION = float(np.tan(np.radians(30.0)))
-"""Of a face that carries weight: a floor that is tilted by 30 degrees holds what stands on it."""
+"""Coefficient of friction of a face that carries weight: a part stays on a floor tilted by 30 degrees."""
 _WALL = 0.3
-"""A face whose normal has a smaller vertical component is a wall: it pushes, and has no friction to count on."""
+"""A face with a smaller |z| of its normal is a wall: it pushes, and has no friction."""
 _TURNS = 2.0 * np.pi * np.arange(8) / 8
+"""Angles around the axis of a round face at which it pushes, [rad]."""
 BALANCED = 1e-7
-"""What is left of the weight, and of its moments over 10 mm, where forces balance it."""
+"""Largest imbalance of a part that stands (rounding of the solver)."""
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = float(np.sin(np.radians(30.0)))
-"""Normals carry weight if forces along them leave no more than this of it: those of a floor tilted by 30 degrees do."""
+"""Normals carry weight if forces along them leave at most this share of it, as on a floor tilted by 30 degrees."""
 _ARM_M = 0.01
-"""Moments are compared with forces on this arm."""
-_ASIDE = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+"""Lever arm by which moments are divided, so that they compare with forces."""
+_ASIDE = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # level shifts of the centre of mass
 _ASIDE.flags.writeable = False
 
 
 def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
     """The first operation whose part, with what it carries, would not stand at its planned goal, counted from 0.
 
-    Vertical forces act at the corners of the overlaps of its contacts: floors push up, ceilings push down, walls
-    carry nothing (there is no friction to count on). If no such forces balance the weight and its moments, the part
-    falls. Of an operation without a contact on a floor or a ceiling nothing is claimed; where pieces are no boxes, of
-    one whose contacts could not carry the weight by their normals.
+    Vertical forces act at the corners of the contact overlaps: floors push up, ceilings push down, walls carry nothing,
+    since friction is not relied on. The part falls if no such forces balance the weight and its moments. An operation
+    without a contact on a floor or ceiling counts as stable. If pieces are not boxes, so does one whose contact normals
+    cannot carry the weight.
 
     Args:
         start: Poses before the first operation, world frame, [m].
@@ -54,13 +54,13 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
 
 
 def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True) -> float:
-    """How much of the weight of what moves, and of its moments over 10 mm, nothing balances, as in `first_unstable`.
+    """The share of the moved parts' weight, and of its moments on a 10 mm arm, that contact forces cannot balance.
 
     Args:
-        known: The contacts, with what is measured already.
-        poses: Every part after the operation, world frame, [m].
-        room_m: The centre of mass is also looked at this far off, level, in four directions; the largest counts.
-        ceilings: Whether what lies above may push down; if not, nothing is claimed of an operation without any.
+        known: Cache of measured contacts.
+        poses: Of every part after the operation, world frame, [m].
+        room_m: The centre of mass is also shifted by this distance to four sides; the largest imbalance counts.
+        ceilings: Whether faces above may push down. If not, the result is 0 for an operation without a ceiling.
     """
     assembly = known.assembly
     centroid = _centroid(assembly, operation, poses)
@@ -68,19 +68,22 @@ def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float
     if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):
         return _of_normals(known, operation, poses, centroid + offs, ceilings)
     points, signs, ups = _forces(known, operation, poses)
+    # No contact could carry weight, or there is no ceiling to leave out: nothing is claimed.
     if not ups or not (ceilings or min(ups) < 0.0):
         return 0.0
+    # Without ceilings only forces upwards remain.
     carrying = signs > (-np.inf if ceilings else 0.0)
     return max(_solve_balance(points[carrying], signs[carrying], centroid + off) for off in offs)
 
 
 def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
-    """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
+    """`imbalance` if some pieces are not boxes: six equations, the largest over centres of mass `at`, (k, 3)."""
     from scipy.optimize import nnls
 
     lies = known.measure((contact, poses) for contact in operation.contacts)
     pushing = [pushes(known.assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
+    # Normals that cannot carry the weight, or no ceiling to leave out: nothing is claimed.
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
         return 0.0
     points, forces = with_friction(pushing)
@@ -95,9 +98,11 @@ def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, 
 
 
 def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:
-    """Where vertical forces may act, (k, 3), world, [m], and whether each pushes up (1) or down (-1), (k,).
+    """The points at which vertical forces may act, and their directions.
 
-    And the same of each contact that could carry weight, also of one that covers nothing.
+    Returns:
+        (points, signs, ups): points, (k, 3), world frame, [m]; 1 for up or -1 for down per point, (k,); the same per
+        level contact, also for contacts without overlap.
     """
     heights = [float((poses[e.part][:3, :3] @ known.assembly.face(e).normal)[2]) for _, e in operation.contacts]
     level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]
@@ -108,14 +113,21 @@ def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array,
 
 
 def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
-    """Centre of mass of all that moves, (3,), world, [m]; parts are homogeneous and of one density."""
+    """Centre of mass of all moved parts, (3,), world frame, [m]; parts are homogeneous, with equal density."""
     volumes = np.array([assembly.solids[part].volume for part in operation.moves])
     centroids = [pose.apply(poses[part], assembly.solids[part].centroid[None])[0] for part in operation.moves]
     return np.asarray(volumes @ np.array(centroids) / volumes.sum())
 
 
 def _solve_balance(points: Array, signs: Array, centroid: Array) -> float:
-    """What forces >= 0 at the points leave of a unit weight at the centroid: three equations, least squares."""
+    """The residual of a unit weight at the centroid that forces >= 0 at the points leave (nonnegative least squares).
+
+    The three equations are vertical force and two moments, on a 10 mm arm.
+
+    Args:
+        points: (k, 3), world frame, [m].
+        signs: 1 for a force upwards, -1 for one downwards, (k,).
+    """
     from scipy.optimize import nnls
 
     if not len(points):
@@ -126,18 +138,18 @@ def _solve_balance(points: Array, signs: Array, centroid: Array) -> float:
 
 
 class Pushes(NamedTuple):
-    """Forces of unit size, and where they act, (k, 3) each, world."""
+    """Unit forces of one contact, and the points at which they act, (k, 3) each, world frame."""
 
     points: Array
     forces: Array
     normals: Array
-    """Along which forces would act if the faces met: as `forces`, also where they miss each other, (n, 3)."""
+    """Directions of possible forces, (n, 3), also if the faces do not meet."""
 
 
 def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
-    """Points and forces, (k, 3) each: those along normals, and four edges of the cone of friction around each."""
+    """Points and forces, (k, 3) each: forces along normals, and four edges of the friction cone of each support."""
     every = list(pushing)
-    points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))
+    points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))  # fields 0 and 1: points, forces
     carrying = np.abs(n[:, 2]) >= _WALL
     held = points[carrying]
     m = n[carrying]
@@ -150,10 +162,10 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
 
 
 def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> Pushes:
-    """What the second part of a contact, which rests, can push the first one with.
+    """The forces with which the resting part of a contact can push the moved one.
 
     Args:
-        lie: How the faces lie to each other, from `Meetings`.
+        lie: The contact as measured by `Meetings`.
     """
     m, e = contact
     nothing = np.zeros((0, 3))
@@ -168,8 +180,10 @@ def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> 
     at = lie.points if lie.common else nothing
     if isinstance(rests, Face):
         assert isinstance(moved, RoundFace)
+        # A shaft rests on a plane: the force acts on its surface, one radius below the axis.
         return _along(T_rests[:3, :3] @ rests.normal, at, -moved.radius)
     if isinstance(moved, Face):
+        # A plane rests on a shaft: the force acts one radius above the axis.
         return _along(-T[:3, :3] @ moved.normal, at, rests.radius)
     assert isinstance(moved, RoundFace)
     around, forces = _around(rests, lie.axis, lie.sine)
@@ -181,20 +195,25 @@ def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> 
 
 
 def _along(n: Array, at: Array, out: float) -> Pushes:
-    """One normal, off points of an axis by so much."""
+    """Unit forces along n, (3,), at points of an axis, (k, 3), moved by `out` [m] along n."""
     return Pushes(at + out * n, np.repeat(n[None], len(at), axis=0), n[None])
 
 
 def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
-    """The directions from the axis to a round wall, and those in which it pushes there, (8, 3) each."""
+    """Directions from the axis to a round wall at 8 angles, and the directions in which the wall pushes, (8, 3) each.
+
+    Args:
+        axis: Unit vector of the axis, (3,), world frame.
+        sine: Sine of the angle between wall and axis; 0 for a cylinder.
+    """
     x = find_direction_across(axis)
     around = np.outer(np.cos(_TURNS), x) + np.outer(np.sin(_TURNS), np.cross(axis, x))
-    sign = -1.0 if rests.hole else 1.0
+    sign = -1.0 if rests.hole else 1.0  # a hole pushes inwards, a shaft outwards
     return around, sign * (np.sqrt(1.0 - sine**2) * around - sine * axis)
 
 
 def _radii(moved: RoundFace, T: Array, rests: RoundFace, T_rests: Array, at: Array) -> Array:
-    """How far the wall is from the axis at points of it, (k,), [m]."""
+    """The radius of the wall at points `at` of its axis, (k,), [m]."""
     if rests.kind == "rim" or moved.kind == "rim":
         return np.full(len(at), rests.radius if rests.kind == "rim" else moved.radius)
     heights = (at - pose.apply(T_rests, rests.point[None])) @ (T_rests[:3, :3] @ rests.axis)

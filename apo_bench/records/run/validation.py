@@ -54,7 +54,7 @@ _TOGETHER = (
     ("contacts_true_positive", "contacts_false_negative", "contacts_false_positive"),
     ("planned_error_fixed_mm", "planned_error_free_mm"),
     ("pose_error_fixed_mm", "pose_error_free_mm"),
-    ("consistency_passes", "suspects"),
+    ("consistent", "suspects"),
     ("probe_contacts", "probe_contacts_rejected", "base_error_estimate_mm", "base_error_estimate_deg"),
 )
 """Columns that are all null, or all not null."""

@@ -1,4 +1,4 @@
-"""Checks that the stated faces of a part lie on its pieces."""
+"""Check that the faces which a file states lie on the pieces of the part."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -25,34 +25,41 @@ from apo_bench.geometry import (
 from apo_bench.scenario.parts.stated import twice_area
 
 _IN_PLANE_M = 1e-6
+"""Points this near to a plane lie in it."""
 _PARALLEL = 1e-7
+"""Unit vectors are parallel if their cosine is this near to 1."""
 _ROUNDED_M = 1e-6
-"""What coordinates in files are rounded by at most, and so walls."""
+"""Largest rounding error of coordinates in files."""
 _BESIDE_M = SAGITTA_M + _ROUNDED_M
+"""Largest distance between a round wall and the sides of its pieces."""
 _WRITTEN_M = 1e-8
-"""Corners of faces that are made are on this grid: writing them does not make them cross."""
+"""Grid of the corners of computed faces, so that rounding in a file does not make their edges cross."""
 _SNAP_M = 1e-9
-"""Areas are united on this grid: without one, some of them may be lost among corners that differ by rounding."""
+"""Grid of the union of areas; without a grid, areas with nearly equal corners may get lost."""
 _ABOVE_M = 2e-5
-"""So far above a face nothing of the part is."""
+"""At this height above a flat face no piece may be."""
 _COARSE = 0.09
-"""Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
+"""Largest distance of the sides of a wall that no contact uses, in radii: a polygon of eight sides is nearer."""
 _TRIED_M = 5e-5
-"""A clearance that any part can have; receded pieces are remembered."""
+"""Clearance with which receding walls are tested."""
 _RAYS = 73
+"""Rays around a wall at each height. A prime number, so that they do not all meet corners of the polygon."""
 _SHARES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])
-"""A prime number of rays: were it that of the sides of a wall, all could meet corners, which are nearest to it."""
+"""Heights of the rays, as fractions of the length of a wall."""
 _LEAST_WALL = 0.5
-"""So much of a round face must be there; bores may cross it."""
+"""Least fraction of a round face that must lie on pieces; bores may cross it."""
 _NEAR = 0.05
-"""So many radii to the free side of a wall nothing of the part is."""
+"""Depth of the free space in front of a wall in which no piece may be, in radii."""
 
 
 def check_faces(solid: Solid, path: Path) -> float:
-    """Raise an `InputError` unless every stated face lies on the pieces, with nothing of them before it.
+    """Raise an `InputError` unless every stated face lies on the pieces, with free space in front of it.
+
+    Args:
+        path: The file, for messages.
 
     Returns:
-        By how much round walls that are cut into flat ones may change the volume, [m^3].
+        Largest error of the volume from round walls that are approximated by flat sides, [m^3].
     """
     for name, flat in solid.faces.items():
         _check_flat(flat, solid.pieces, f"{path}, faces, {name}")
@@ -60,14 +67,14 @@ def check_faces(solid: Solid, path: Path) -> float:
 
 
 def _near(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
-    """Those of the pieces that reach into the box around some points, (k, 3), or as near to it."""
+    """The pieces whose bounding box meets the bounding box of points (k, 3), enlarged by a margin."""
     low = corners.min(axis=0) - margin
     high = corners.max(axis=0) + margin
     return [p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()]
 
 
 def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
-    """A face is made of sides of pieces that look its way, and lies bare."""
+    """Raise an `InputError` unless sides of pieces lie below all of a flat face, and no piece covers it."""
     import shapely
 
     n = face.normal
@@ -90,7 +97,11 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
 
 
 def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
-    """Sides of pieces in the plane of a face, as flat areas."""
+    """The sides of pieces that lie in the plane of a face and look its way, as shapely areas.
+
+    Args:
+        to_plane: (3, 2), two unit vectors in the plane as columns.
+    """
     height = face.normal @ face.outline[0]
     return [
         _shadow(piece, side, to_plane)
@@ -101,12 +112,13 @@ def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
 
 
 def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
-    """What of a flat face lies on sides of pieces, and its share; None if that is not a single area."""
+    """The part of a flat face that lies on sides of pieces, and its fraction of the area; None if not one area."""
     import shapely
 
     to_plane = find_plane_across(face.normal)
     stated = shapely.make_valid(make_flat_area(face.outline, face.holes, to_plane))
     lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
+    # Shrinking and growing removes slivers; the sum of the offsets is 0.
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
     lying = shapely.set_precision(shapely.make_valid(lying.simplify(_ROUNDED_M)), _WRITTEN_M)
@@ -114,6 +126,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
         return None
     off = (face.normal @ face.outline[0]) * face.normal
     rings = [ring @ to_plane.T + off for ring in list_rings(lying)]
+    # The outline counter-clockwise as seen from outside, holes clockwise.
     oriented = [
         ring if (twice_area(ring) @ face.normal > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)
     ]
@@ -121,7 +134,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
 
 
 def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
-    """A side of a piece as a flat area."""
+    """A side of a piece, a row (4,) of its planes, as a shapely area."""
     from shapely import MultiPoint
 
     corners = piece.corners
@@ -129,7 +142,13 @@ def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
 
 
 def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
-    """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
+    """Raise an `InputError` unless pieces lie at the stated radius of a wall, and nothing is in front of it.
+
+    Rays from the axis are intersected with the pieces at several heights.
+
+    Returns:
+        Largest volume between the wall and the sides of the pieces, [m^3].
+    """
     heights, radii = _samples(wall)
     angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if wall.toward is None else 0.5))
     near = _near(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
@@ -140,7 +159,7 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
     for height, radius in zip(heights, radii, strict=True):
         enter, leave = _crossed(near, wall.point + height * wall.axis, wall.around(angle))
-        sign = 1.0 if wall.hole else -1.0
+        sign = 1.0 if wall.hole else -1.0  # the material is outside of a hole, inside of a shaft
         free = sorted((radius - sign * _BESIDE_M, radius - sign * max(_NEAR * radius, 2.0 * _BESIDE_M)))
         into = (np.minimum(leave, free[1]) - np.maximum(enter, free[0]) > _ROUNDED_M).any(axis=0)
         at = (
@@ -165,9 +184,9 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
 
 
 def check_receding(solid: Solid, path: Path) -> None:
-    """Raise an `InputError` unless round holes that are fit get wider all around.
+    """Raise an `InputError` unless round holes that are fit get wider all around with a clearance.
 
-    A piece that only touches such a wall in a corner has no side that recedes.
+    A piece that touches such a wall only with a corner has no side that recedes.
     """
     walls = [wall for wall in solid.rounds.values() if wall.fit and wall.hole and wall.kind == "cylinder"]
     for wall in walls:
@@ -182,7 +201,7 @@ def check_receding(solid: Solid, path: Path) -> None:
 
 
 def _samples(wall: RoundFace) -> tuple[Array, Array]:
-    """Heights from the point of a wall and the radii there; of a rim, just inside of the part."""
+    """Heights of the rays along the axis of a wall, and its radii there, (k,) each; for a rim just inside the part."""
     if wall.kind == "rim":
         return np.array([wall.span[0] - _ROUNDED_M]), np.array([wall.radius])
     heights = wall.span[0] + wall.length * _SHARES
@@ -190,11 +209,12 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
 
 
 def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
-    """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
+    """Distances at which rays `out` (r, 3) enter and leave each piece, (pieces, r) each; inf and -inf for a miss."""
     enter, leave = np.array([measure_passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
     behind = leave <= 0.0
     return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
 
 
 def _fail(place: str, what: str) -> NoReturn:
+    """Raise an `InputError` with the remedy."""
     raise InputError(f"{place}: {what}; state the face as the pieces are, or correct the pieces.")

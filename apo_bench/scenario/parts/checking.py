@@ -1,4 +1,4 @@
-"""Checks of what is stated of a part against its pieces."""
+"""Check the stated volume, centroid, inertia and faces of a part against its pieces."""
 
 from collections.abc import Sequence
 
@@ -10,16 +10,17 @@ from apo_bench.scenario.parts.agreement import check_faces, check_receding
 from apo_bench.scenario.parts.part_file import PartFile
 
 _TOUCHING_M = 2e-5
-"""Thinner layers of a solid may be left out between its pieces."""
+"""Pieces with a smaller gap touch."""
 _SHARE = 1e-3
-"""Of the volume."""
+"""Largest relative error of the stated volume."""
 
 
 def check_matter(solid: Solid, file: str, rounded: float) -> None:
     """Raise an `InputError` unless volume, centroid and inertia are those of the pieces, within 0.1 percent.
 
     Args:
-        rounded: By how much round walls that are cut into flat ones may change the volume, [m^3].
+        file: The file, for messages.
+        rounded: Largest error of the volume from round walls that are approximated by flat sides, [m^3].
     """
     assert solid.inertia is not None
     mesh = build_union_mesh(solid.pieces)
@@ -40,12 +41,13 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
 
 
 def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
-    """Which pieces touch each other, over some of them."""
+    """Group the indices of pieces that are connected by touching, directly or through other pieces."""
     from scipy.cluster.hierarchy import DisjointSet
 
     solids = DisjointSet(range(len(pieces)))
     low = np.array([piece.center - piece.half for piece in pieces]) - _TOUCHING_M
     high = np.array([piece.center + piece.half for piece in pieces]) + _TOUCHING_M
+    # Only pairs whose bounding boxes meet are tested.
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
             if not solids.connected(i, int(k)) and _gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
@@ -54,7 +56,7 @@ def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
 
 
 def _gap(a: Piece, b: Piece) -> float:
-    """How far two pieces are apart along the direction in which it is most, [m]; negative if they overlap."""
+    """The largest gap between two pieces along any separating axis, [m]; negative if they overlap."""
     axes = find_separating_axes(a, np.eye(3), b, np.eye(3))
     at, reach = project_on_axes(a, np.eye(3), axes)
     on, room = project_on_axes(b, np.eye(3), axes)
@@ -62,7 +64,7 @@ def _gap(a: Piece, b: Piece) -> float:
 
 
 def check_part(file: PartFile, solid: Solid) -> None:
-    """Raise an `InputError` unless what is stated of a part is so of its pieces."""
+    """Raise an `InputError` unless the stated properties of a part agree with its pieces."""
     if file.stated is not None:
         count = len(touching_groups(solid.pieces))
         require(count == 1, f"{file.path}: the pieces make {count} separate solids; a part is one rigid piece.")

@@ -1,7 +1,7 @@
-"""The union of boxes as a solid with flat faces, exactly.
+"""The exact union of boxes as a solid with flat faces.
 
-A mesh union computes in rounded numbers and leaves stray corners and fins where boxes share planes; on the grid every
-cell is full or empty, and a face is what lies between the two.
+A mesh union rounds, and leaves stray corners and fins where boxes share planes. Here the planes of all sides form a
+grid whose cells are full or empty, and faces lie between full and empty cells.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,11 +16,11 @@ from apo_bench.geometry import Array, Box, list_polygons, list_rings, straighten
 _SAME_PLANE_M = 1e-9
 """Sides of boxes this near to each other lie in one plane."""
 SIDES = ("px", "nx", "py", "ny", "pz", "nz")
-"""Outward direction of a face, in the order of faces in a solid; also the stem of automatic names."""
+"""Outward directions of faces, in the order of faces in a solid; also the stems of automatic names."""
 
 
 class UnnamedFace(NamedTuple):
-    """One face without a name yet."""
+    """A face of the union, before it has a name."""
 
     side: int
     """Index into `SIDES`."""
@@ -31,21 +31,24 @@ class UnnamedFace(NamedTuple):
 
     @property
     def axis(self) -> int:
+        """Index of the axis of its normal, 0 to 2."""
         return self.side // 2
 
     @property
     def sign(self) -> int:
+        """1 if it looks along the axis, -1 if against it."""
         return 1 - 2 * (self.side % 2)
 
     def flat(self, points: Array) -> Array:
-        """The coordinates of points (k, 3) in the plane, (k, 2)."""
+        """The coordinates (k, 2) of points (k, 3) in its plane."""
         return points[:, [(self.axis + 1) % 3, (self.axis + 2) % 3]]
 
     def rings(self) -> tuple[Array, ...]:
-        """Outline, counter-clockwise seen from outside, then holes, clockwise; each (k, 3)."""
+        """Its outline, counter-clockwise as seen from outside, then its holes, clockwise; (k, 3) each, [m]."""
         return tuple(map(self._lifted, list_rings(self.shape, self.sign)))
 
     def _lifted(self, ring: Array) -> Array:
+        """A ring in its plane as points (k, 3), beginning with the lowest corner."""
         flat = straighten(ring)
         flat = np.roll(flat, -np.lexsort(flat.T[::-1])[0], axis=0)
         out = np.empty((len(flat), 3))
@@ -55,7 +58,7 @@ class UnnamedFace(NamedTuple):
 
 
 class Union(NamedTuple):
-    """The solid that boxes make together."""
+    """The union of boxes."""
 
     surfaces: tuple[UnnamedFace, ...]
     """In the order of `SIDES`, then by height, then by lowest corner."""
@@ -64,14 +67,14 @@ class Union(NamedTuple):
     volume: float
     """[m^3]."""
     pieces: int
-    """How many solids it is; those that only share an edge or a corner count apart."""
+    """Number of separate solids; solids that share only an edge or a corner are separate."""
 
 
 def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
-    """The union of boxes; every coordinate is that of a side of a box.
+    """Compute the union of boxes; all its coordinates are those of sides of boxes.
 
     Args:
-        most: Stop at so many surfaces.
+        most: Largest number of surfaces to compute; None: all.
     """
     from scipy.ndimage import label
 
@@ -86,13 +89,13 @@ def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
 
 
 def _planes(boxes: Sequence[Box], axis: int) -> Array:
-    """The coordinates of all sides along an axis, ascending, each once."""
+    """The coordinates of all sides along an axis, ascending, each once, [m]."""
     sides = np.sort([box.center[axis] + sign * box.half[axis] for box in boxes for sign in (-1, 1)])
     return np.round(sides[np.diff(sides, prepend=-np.inf) > _SAME_PLANE_M], 12)
 
 
 def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_]:
-    """Which cells of the grid lie in a box."""
+    """(cells along x, y, z), True for each cell of the grid that lies in a box."""
     full = np.zeros([len(planes) - 1 for planes in grid], dtype=np.bool_)
     for box in boxes:
         low = box.center - box.half
@@ -106,14 +109,14 @@ def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_
 
 
 def _runs(bare: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
-    """The runs of cells (i, j) of a mask along j: i, the lowest j, and the one beyond the highest, (n,) each."""
-    # They begin where the padded row steps up and end where it steps down.
+    """Find the runs of True in the rows of a mask: row, first column, column after the last one, (n,) each."""
+    # A run begins where the padded row steps up, and ends where it steps down.
     ends = np.diff(np.pad(bare, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     return *np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
 
 
 def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[UnnamedFace]:
-    """Every face: squares between full and empty cells, gathered by plane, joined where they share an edge."""
+    """Yield every face: rectangles between full and empty cells, per plane, joined where they share an edge."""
     import shapely
 
     for side in range(len(SIDES)):

@@ -1,4 +1,4 @@
-"""Mark faces of a part as fit, so that they recede by the clearance."""
+"""Mark faces of a part as fit, so that the clearance moves them into the part."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,20 +10,19 @@ from apo_bench.scenario.parts.agreement import check_receding
 
 
 def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
-    """Mark these faces of a solid as fit, each moved into it by its undersize first.
+    """Mark faces of a solid as fit, after moving each of them into the solid by its undersize.
 
-    A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
-    the clearance. Outlines of neighbouring faces keep what was there.
+    For example, an undersize of 0.05 mm per side makes a wall fit between two walls that are 0.1 mm too near to each
+    other; the clearance then gives it play. Outlines of neighbouring faces are not changed.
 
-    A part that was drawn with play is made as thick as there is room by undersizes below 0: then its walls touch, and
-    the clearance makes it as thin as it was drawn.
+    An undersize below 0 thickens a part that was drawn with play until it touches; the clearance restores the play.
 
     Args:
-        undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
+        undersizes_mm: Name of a face -> distance by which it moves into the solid, [mm].
 
     Raises:
-        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or
-            nothing is left of a piece.
+        InputError: A face is unknown, is the side of a box together with another one, is a hole that cannot get wider,
+            or nothing is left of a piece.
     """
     for face in undersizes_mm:
         require_known("face", face, (*solid.faces, *solid.rounds), place="fit")
@@ -44,6 +43,7 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
 
 
 def _flat(face: Face, by_mm: float | None) -> Face:
+    """The face moved into the part and marked as fit; unchanged if `by_mm` is None."""
     if by_mm is None:
         return face
     off = -1e-3 * by_mm * face.normal
@@ -51,6 +51,7 @@ def _flat(face: Face, by_mm: float | None) -> Face:
 
 
 def _wall(face: RoundFace, by_mm: float | None) -> RoundFace:
+    """The wall moved into the part and marked as fit; unchanged if `by_mm` is None."""
     if by_mm is None:
         return face
     by_m = 1e-3 * by_mm * (1.0 if face.hole else -1.0)

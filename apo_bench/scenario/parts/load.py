@@ -13,7 +13,7 @@ from apo_bench.scenario.parts.part_file import NamedSite, PartFile, read_part
 from apo_bench.scenario.parts.stated import StatedPart
 
 _ON_FACE_M = 1e-6
-"""A site lies on a face if it is this near to its plane and this far from its edges."""
+"""A site lies on a face if it is nearer to its plane and farther from its edges than this."""
 
 
 def list_part_names() -> tuple[str, ...]:
@@ -22,7 +22,7 @@ def list_part_names() -> tuple[str, ...]:
 
 
 def find_part_path(given: str | Path) -> Path:
-    """The file a short name or a path stands for.
+    """The path of the part file that a short name or a path refers to.
 
     Raises:
         InputError: No part has that short name.
@@ -34,16 +34,15 @@ def find_part_path(given: str | Path) -> Path:
 
 
 def load_part(given: str | Path, checked: bool = True) -> Solid:
-    """The solid of a part file, named after the file.
+    """Load the solid of a part file; it is named after the file.
 
-    Of boxes alone it is their union, with faces named by the sites that lie on them; those without a site are called
-    `auto_px_1`, ...: outward direction, and their number along it. Of other pieces, faces, volume, centroid and inertia
-    are those that `NAME.toml` next to it states. What does not come with the package is held against a mesh of the same
-    pieces.
+    A part of boxes is their union, with faces named by the sites that lie on them. Faces without a site are called
+    `auto_px_1`, ...: outward direction and a number. For other pieces, `NAME.toml` next to the file states faces,
+    volume, centroid and inertia. Files from outside of the package are checked against a mesh of their pieces.
 
     Args:
         given: The short name of a part of the package, or the path of an MJCF file.
-        checked: Whether it is held against that mesh; not if the package has just written it.
+        checked: False skips that check, for a file that the package has just written.
 
     Raises:
         InputError: The file breaks a rule; the message names file, element and remedy.
@@ -62,7 +61,7 @@ def load_part(given: str | Path, checked: bool = True) -> Solid:
 
 
 def _stated(file: PartFile, stated: StatedPart) -> Solid:
-    """The solid of any convex pieces, with the faces that are stated."""
+    """The solid of convex pieces, with the faces, volume, centroid and inertia of its TOML file."""
     return Solid(
         file.path.stem,
         stated.faces,
@@ -75,7 +74,7 @@ def _stated(file: PartFile, stated: StatedPart) -> Solid:
 
 
 def _united(file: PartFile) -> Solid:
-    """The union of boxes, with the faces that sites mark."""
+    """The solid of a part of boxes: their union, with faces named by its sites."""
     boxes = tuple(piece for piece in file.pieces if isinstance(piece, Box))
     union = unite(boxes, MOST_FACES + 1)
     require(
@@ -105,6 +104,7 @@ def _united(file: PartFile) -> Solid:
 
 
 def _under(file: PartFile, mark: NamedSite, surfaces: tuple[UnnamedFace, ...]) -> int:
+    """The index of the surface on which a site lies; an `InputError` if it lies on an edge or on no surface."""
     from shapely import Point
 
     where = ", ".join(f"{1e3 * x:g}" for x in mark.point)

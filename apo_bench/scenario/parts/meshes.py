@@ -1,4 +1,4 @@
-"""Convex pieces of part files."""
+"""Make convex pieces from the corners in part files, and check that they are convex."""
 
 from pathlib import Path
 
@@ -8,16 +8,20 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, Hull
 
 _SAME_M = 1e-7
-"""Corners nearer to each other are one; a corner this far inside of the piece is none."""
+"""Corners nearer to each other are repeated; a corner farther inside the convex hull makes the piece not convex."""
 _THINNEST_M = 1e-5
-"""A piece is thicker than this across each of its sides."""
+"""Least thickness of a piece across each of its sides."""
 
 
 def make_hull(path: Path, name: str, corners: Array) -> Hull:
-    """The piece with these corners, (k, 3), [m].
+    """Make the piece with these corners.
+
+    Args:
+        path: The part file, for messages.
+        corners: (k, 3), [m].
 
     Raises:
-        InputError: A corner is repeated or inside of the others, or all lie in a plane.
+        InputError: A corner is repeated or inside the convex hull, or all corners lie in a plane.
     """
     from scipy.spatial import QhullError, cKDTree
 
@@ -25,6 +29,7 @@ def make_hull(path: Path, name: str, corners: Array) -> Hull:
     require(not repeated, f"{path}: piece '{name}' has a corner twice; remove one of the two.")
     hull = Hull(name, corners)
     try:
+        # Depth of each corner below each side, (sides, corners).
         below = hull.planes[:, 3] - corners @ hull.planes[:, :3].T
     except QhullError:
         below = np.zeros((1, 1))

@@ -1,4 +1,4 @@
-"""Read a part file as convex pieces."""
+"""Read a part file (MJCF) and the TOML file next to it into convex pieces, marks and stated properties."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,57 +25,60 @@ if TYPE_CHECKING:
     from apo_bench.mjcf.part_file import PartGeom, PartModel
 
 _FIT_CLASS = "fit"
+"""MJCF default class of sites that mark a face as fit."""
 _SHORTEST_AXIS = 1e-3
+"""Least length of a `zaxis` attribute."""
 _AUTOMATIC = "auto_"
-"""What names of faces without a name begin with."""
+"""Prefix of automatic names of faces."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class NamedSite:
-    """A site: the face on which it lies gets its name."""
+    """A site, which gives its name to the face on which it lies."""
 
     name: str
     point: Array
     """(3,), frame of the part, [m]."""
     fit: bool
+    """The face recedes by the clearance."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PartFile:
-    """What a part file says, with the file next to it."""
+    """The content of a part file and of the TOML file next to it."""
 
     path: Path
     pieces: tuple[Piece, ...]
-    """Named and ordered as the geoms."""
+    """In the order and with the names of the geoms."""
     marks: tuple[NamedSite, ...]
-    """Of boxes alone."""
+    """Names of faces, for a part of boxes; else empty."""
     stated: StatedPart | None
-    """What stands next to it; None of boxes alone."""
+    """Content of the TOML file; None for a part of boxes."""
     density: float
     """[kg/m^3]."""
     model: "PartModel"
-    """Surfaces, sites and picture, for a simulator."""
+    """Geoms, sites and picture, for a simulator."""
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the part is made of: its part file, the picture that this names, and the file next to it."""
+        """The paths of the part file, of its picture if it has one, and of the TOML file if there is one."""
         pictures = () if self.model.picture is None else (self.model.picture.file,)
         return self.path, *pictures, *(() if self.stated is None else (self.path.with_suffix(".toml"),))
 
 
 def read_part(path: Path) -> PartFile:
-    """Read a part file; once, as long as it and the file next to it stay as they are.
+    """Read a part file; an unchanged file, with an unchanged TOML file, is read only once.
 
     Raises:
-        InputError: The file cannot be read, or is not one body of named pieces; or so the one next to it.
+        InputError: The file cannot be read or is not one body of named pieces, or the TOML file is not valid.
     """
     return _kept(path, _stamp(path), _stamp(path.with_suffix(".toml")))
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:
-    """Time, size and number of a file; None if there is none."""
+    """Modification time, size and inode of a file; None if there is none."""
     try:
         stat = path.stat()
     except (OSError, ValueError):
@@ -85,6 +88,7 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
 
 @lru_cache(maxsize=64)
 def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
+    """Read a part file; `stamps` are only keys of the cache."""
     from apo_bench.mjcf.part_file import read_part_model
 
     model = read_part_model(path)
@@ -104,7 +108,7 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
 
 
 def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFile:
-    """A part of boxes alone."""
+    """The part file of a part that consists of boxes only."""
     densities = {geom.density for geom in model.geoms}
     require(
         len(densities) == 1 and DENSITY[0] <= min(densities) <= DENSITY[1],
@@ -117,7 +121,7 @@ def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFi
 
 
 def _piece(path: Path, geom: "PartGeom") -> Piece:
-    """The piece of a geom."""
+    """The piece of a geom; an `InputError` if its size is not allowed."""
     place = f"{path}: geom '{geom.name}'"
     if geom.kind == "mesh":
         require(len(geom.corners) >= 4 and np.abs(geom.corners).max() <= LARGEST_M, f"{place} needs 4 corners or more.")

@@ -1,4 +1,4 @@
-"""Read the file next to a part file: faces and matter of the part."""
+"""Read the TOML file next to a part file, which states faces, volume, centroid, inertia and material."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,14 +15,19 @@ from apo_bench.scenario.parts.allowed import DENSITY, LARGEST_PART_BYTES, MOST_F
 
 PART_SCHEMA = "apo-bench/part/1"
 USUAL_DENSITY = 1000.0
-"""[kg/m^3], where none is stated."""
+"""Default density, [kg/m^3]."""
 _LARGEST_MM = 10_000.0
+"""Largest absolute coordinate."""
 _FLAT_MM = 1e-3
-"""Corners of a face lie this near to its plane."""
+"""Largest distance of the corners of a face from its plane."""
 _SMALLEST_MM2 = 1e-6
+"""Least area of a flat face."""
 _THINNEST_RADIUS_MM = 0.05
+"""Least radius of a cylinder or a rim."""
 _SHORTEST_MM = 1e-3
+"""Least length of a wall, and least difference of the radii of a cone."""
 _UNIT = 1e-6
+"""Least length of a direction; its inverse is the largest."""
 _Length = Annotated[float, Meta(ge=-_LARGEST_MM, le=_LARGEST_MM)]
 _Point = tuple[_Length, _Length, _Length]
 _Radius = Annotated[float, Meta(ge=_THINNEST_RADIUS_MM, le=_LARGEST_MM)]
@@ -76,7 +81,7 @@ FaceTable = PlaneTable | CylinderTable | ConeTable | RimTable
 
 
 class MatterTable(FileTable, frozen=True, kw_only=True):
-    """The whole file."""
+    """All entries of the file."""
 
     schema: Literal["apo-bench/part/1"]
     faces: Annotated[dict[str, Any], Meta(min_length=1, max_length=MOST_FACES)]
@@ -93,7 +98,7 @@ class MatterTable(FileTable, frozen=True, kw_only=True):
 @final
 @dataclass(frozen=True, eq=False)
 class StatedPart:
-    """What a `NAME.toml` says of the part in `NAME.xml`."""
+    """The content of `NAME.toml`, next to the part file `NAME.xml`."""
 
     faces: Mapping[str, Face]
     rounds: Mapping[str, RoundFace]
@@ -102,20 +107,20 @@ class StatedPart:
     centroid: Array
     """(3,), [m]."""
     inertia: Array
-    """Of density 1 about the centroid, (3, 3), [m^5]."""
+    """(3, 3), about the centroid, for density 1, [m^5]."""
     density: float
     """[kg/m^3]."""
     friction: tuple[float, ...]
-    """Sliding, and then turning and rolling, as in MJCF; empty if unsaid."""
+    """Sliding, then torsional, then rolling, as in MJCF; missing values are those of the geoms."""
     title: str
-    """What a person calls the part, in any letters; empty if unsaid."""
+    """Name for people, in any letters; empty if not stated."""
 
 
 def read_stated_part(path: Path) -> StatedPart:
-    """Read the file next to a part file.
+    """Read the TOML file next to a part file.
 
     Raises:
-        InputError: Anything in the file that is not as described, naming file and place.
+        InputError: The file is not valid; the message names file and place.
     """
     top = read_typed(path, MatterTable, "file that states the faces of a part", limit=LARGEST_PART_BYTES)
     faces = [_face(name, value, f"{path}, faces, {name}") for name, value in top.faces.items()]
@@ -132,12 +137,14 @@ def read_stated_part(path: Path) -> StatedPart:
 
 
 def _face(name: str, value: Any, place: str) -> Face | RoundFace:
+    """The face of one entry of `[faces]`."""
     require(is_name(name), f"{place}: letters, digits and underscores after a letter are needed as a name.")
     table: FaceTable = convert_typed(value, FaceTable, place)  # type: ignore[arg-type]
     return _plane(name, table, place) if isinstance(table, PlaneTable) else _round(name, table, place)
 
 
 def _plane(name: str, table: PlaneTable, place: str) -> Face:
+    """The flat face of a table, after checking that its rings are flat, oriented and do not cross."""
     outline = np.array(table.outline_mm)
     holes = [np.array(hole) for hole in table.holes_mm]
     across = twice_area(outline)
@@ -153,12 +160,13 @@ def _plane(name: str, table: PlaneTable, place: str) -> Face:
 
 
 def twice_area(ring: Array) -> Array:
-    """Twice the area of a ring as a vector along its normal, (3,)."""
+    """Twice the area of a ring (k, 3) as a vector (3,) along its normal, by the right-hand rule."""
     corners = ring - ring[0]
     return np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
 
 
 def _round(name: str, table: CylinderTable | ConeTable | RimTable, place: str) -> RoundFace:
+    """The round face of a table, after checking radii, span and extent."""
     axis = _unit(table.axis, f"{place}, axis")
     radii = table.radii_mm if isinstance(table, ConeTable) else (table.radius_mm, table.radius_mm)
     ends = (1e-3 * radii[0], 1e-3 * radii[1])
@@ -187,6 +195,7 @@ def _round(name: str, table: CylinderTable | ConeTable | RimTable, place: str) -
 
 
 def _unit(stated: Triple, place: str) -> Array:
+    """The unit vector (3,) of a stated direction."""
     v = np.array(stated)
     length = float(np.linalg.norm(v))
     require(_UNIT < length < 1.0 / _UNIT, f"{place}: a direction, three numbers that are not all 0, is needed.")
@@ -194,7 +203,7 @@ def _unit(stated: Triple, place: str) -> Array:
 
 
 def _across(stated: Triple, axis: Array, place: str) -> Array:
-    """A unit vector across the axis."""
+    """The unit vector (3,) of a stated direction, made exactly orthogonal to the axis."""
     v = _unit(stated, place)
     require(abs(v @ axis) <= 1e-3, f"{place}: a direction across the axis is needed.")
     v = v - (v @ axis) * axis
@@ -202,7 +211,7 @@ def _across(stated: Triple, axis: Array, place: str) -> Array:
 
 
 def _inertia(six: tuple[float, ...], place: str) -> Array:
-    """xx, yy, zz, xy, xz, yz as a matrix."""
+    """The inertia (3, 3) of xx, yy, zz, xy, xz, yz; an `InputError` unless it is positive definite."""
     xx, yy, zz, xy, xz, yz = six
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     solid = np.abs(J).max() < 1e30 and np.linalg.eigvalsh(J)[0] > 0.0

@@ -1,1 +1,1 @@
-"""What an arm can do, found before it moves: at the table, and along a plan."""
+"""Check an arm before it moves: at the table of a scenario, and along a plan."""

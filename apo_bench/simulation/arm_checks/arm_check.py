@@ -1,4 +1,4 @@
-"""Check what an arm can do at the table."""
+"""Check an arm at the table of a scenario: reach, tip errors, stiffness, grip force, joint limits."""
 
 from dataclasses import dataclass
 from typing import final
@@ -24,49 +24,50 @@ from apo_bench.simulation.robot import (
 )
 from apo_bench.simulation.scene import Scene, build_scene
 
+# Positions over the table, [m].
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
 _TABLE_M = 0.03  # height of the tip over the table
-_TURNS = (-1.2, 0.0, 1.2)  # turns about the vertical from home, [rad], at which the table is to be reached
-_PUSH_N = 5.0  # stiffness is measured by this push
-_PUSH_S = 0.5  # which lasts so long
-_LAYOUTS = 20
+_TURNS = (-1.2, 0.0, 1.2)  # yaws of the tip relative to home, [rad], that are tried
+_PUSH_N = 5.0  # force by which stiffness is measured
+_PUSH_S = 0.5  # duration of that force
+_LAYOUTS = 20  # drawn layouts whose plans are checked
 _LEAST_FORCE_N = 10.0
-"""Of each pad: below it parts slip."""
-_LEAST_MARGIN_DEG = 5.0
+"""Least force of each pad; below it parts slip."""
+_LEAST_MARGIN_DEG = 5.0  # least distance of a joint from its limit
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ArmCheck:
-    """What was found of an arm."""
+    """The measurements of an arm at the table of a scenario."""
 
     arm: Arm
     scenario: str
     reached: Array
-    """(k, 3): x, y [m] of a grid over the table, and the part of the turns at which it is reached there."""
+    """(k, 3): x, y [m] of a grid over the table, and the share of yaws that are in reach there."""
     tip_errors: tuple[TipError, ...]
     rest_error_mm: float
-    """After it has come to a stand."""
+    """Error of the tip after it has come to rest."""
     mm_per_n: tuple[float, float, float]
-    """Along x, y, z of the world."""
+    """Displacement of the tip per newton along x, y, z of the world."""
     opening_mm: float
     force_n: float
-    """Of each pad."""
+    """Force of each pad."""
     margins_deg: Array
-    """(joints,), the least distance of each from its limits along the plans in reach; infinite for a joint without
-    limits; not a number where no plan is in reach."""
+    """(joints,), the least distance of each joint from its limits over the plans in reach; infinite for a joint without
+    limits; not a number if no plan is in reach."""
     layouts: int
     layouts_reached: int
     clearance_mm: float
     missing: tuple[str, ...]
-    """What is not there or not enough, each with what to do."""
+    """Missing data and insufficient values, each with the remedy."""
 
 
 def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck:
-    """Try an arm at the table of a scenario.
+    """Measure an arm at the table of a scenario.
 
     Args:
-        layouts: How many layouts are checked.
+        layouts: Number of drawn layouts whose plans are checked.
     """
     missing = missing_data(arm)
     try:
@@ -119,7 +120,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
 
 
 def missing_data(arm: Arm) -> list[str]:
-    """What the files of an arm could state and do not, each with what follows from that."""
+    """Data that the files of an arm do not state, each with the consequence."""
     missing = []
     if arm.limits.payload_kg is None:
         missing.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
@@ -133,6 +134,7 @@ def missing_data(arm: Arm) -> list[str]:
 
 
 def _reach(kinematics: Kinematics, arm: Arm) -> Array:
+    """`ArmCheck.reached`, by inverse kinematics."""
     rows = []
     rest = measure_turn(tip_down(np.zeros(3)), kinematics.forward(arm.home))
     for x, y in _GRID:
@@ -145,13 +147,19 @@ def _reach(kinematics: Kinematics, arm: Arm) -> Array:
 
 
 def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, float, float]]:
-    """Errors along a line and at rest, [mm], and how far a newton pushes the tip, [mm/N], in free air."""
+    """The tip errors of an arm in free air.
+
+    Returns:
+        (errors at `SPEEDS`, error at rest [mm], displacement per newton along x, y, z [mm/N]); () and not a number if
+        the arm has no such line in reach.
+    """
     robot = Robot(scene, scene.scenario.start)
     errors = []
     try:
         with robot.watch_stability():
             rise(robot, 0.3)
             for i, speed in enumerate(SPEEDS):
+                # A tenth of the line at the lowest speed, which would take too long.
                 length = STRETCH_M if speed > SPEEDS[0] else STRETCH_M / 10
                 end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), length)
                 line = (
@@ -170,9 +178,10 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
 
 
 def _push(robot: Robot, force: Array) -> Array:
-    """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
+    """The position of the tip, (3,), world frame, [m], after a force [N] has acted on it for `_PUSH_S`."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force
+    # Moment of the force about the body's centre of mass.
     robot.data.xfrc_applied[body, 3:] = np.cross(robot.tip()[:3, 3] - robot.data.xipos[body], force)
     robot.wait(_PUSH_S)
     robot.data.xfrc_applied[body] = 0.0
@@ -180,15 +189,16 @@ def _push(robot: Robot, force: Array) -> Array:
 
 
 def _force(arm: Arm, scene: Scene) -> float:
-    """Of each pad, [N]; of slides that one actuator drives together half of its force."""
+    """The force of each pad, [N]; slides that one actuator drives together share its force."""
     if arm.hand is not None:
         return arm.hand.force_n
     return float(scene.work.model.actuator(f"arm/{arm.grip}").forcerange[1]) / len(arm.fingers)
 
 
 def _margins(scene: Scene, plan: Plan) -> Array:
+    """The least distance of each joint from its limits along a plan, (joints,), [deg]; not a number if out of reach."""
     least = np.full(len(scene.arm.joints), np.inf)
-    for move in plan_moves(plan, scene):
+    for move in plan_moves(plan, scene, False, ()):
         angles = solve_key_angles(move.transfer, scene)
         if angles.code:
             return np.full(len(least), np.nan)

@@ -1,4 +1,4 @@
-"""Find where a base or the site could stand so that an arm reaches a whole scenario."""
+"""Suggest a base or a site at which an arm reaches a whole scenario."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -13,14 +13,15 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.scene import Scene
 
 _BASES_M = tuple(product((0.0, 0.1, 0.2), (-0.45, -0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1)))
-"""Height and place behind the middle of the table."""
+"""Candidate bases: height and x, [m]; the middle of the table has x = 0."""
 _NEARER_M = (0.04, 0.08, 0.12)
+"""Candidate shifts of the site towards the arm."""
 _NARROWER = 0.5
-"""How much nearer to the arm the site may be, which then is narrower."""
+"""Factor on the spread of a shifted site."""
 
 
 def place_in_reach(scene: Scene, reaches: Callable[[Scene], bool]) -> str:
-    """What to state so that all is in reach, for the file of the arm or of the scenario; empty where nothing is found.
+    """The setting in the arm file or scenario file that brings everything into reach; empty if none was found.
 
     Args:
         reaches: Whether the arm of a scene reaches its scenario.
@@ -29,7 +30,7 @@ def place_in_reach(scene: Scene, reaches: Callable[[Scene], bool]) -> str:
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """The arm elsewhere, then the site nearer to where it is."""
+    """Candidates with their setting in words: the arm at other bases, then the site nearer to the arm."""
     for z, x in _BASES_M if scene.arm.hand is not None else ():
         with suppress(InputError):
             arm = with_home(replace(scene.arm, base=(x, 0.0, z)), base_is_stated=True)

@@ -1,4 +1,4 @@
-"""Predict what an arm makes of a plan."""
+"""Compute how an arm would execute a plan (`ArmMove`), for failure prediction."""
 
 from collections.abc import Iterable, Sequence
 from typing import Literal, cast
@@ -23,23 +23,23 @@ from apo_bench.simulation.execution import (
 from apo_bench.simulation.robot import list_gripper_boxes
 from apo_bench.simulation.scene import Scene
 
-_AT_LIMIT_RAD = np.radians(0.5)
+_AT_LIMIT_RAD = np.radians(0.5)  # a joint nearer to its limit counts as at the limit
 
 _Refused = Literal["unreachable_start", "unreachable"]
 
 
 def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, ...]:
-    """Every transfer of a plan as the arm of a scene would do it.
+    """The motion of the scene's arm in every transfer of a plan.
 
-    Of the usual arm, and of an `Arm` that was made without a description, only reach is checked: predictions
-    without an arm were tuned with that one.
+    For the default arm, and for an `Arm` made without a description, only reach is computed, since predictions without
+    an arm were tuned with the default one.
 
     Args:
         spiral: As in `plan_moves`.
     """
     predicted = list[ArmMove]()
     estimated = plan.start
-    for move in plan_moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral, ()):
         operation = plan.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]
@@ -49,12 +49,12 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
 
 
 def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], estimated: Poses, after: Poses) -> ArmMove:
-    """One transfer.
+    """The motion of the arm in one transfer.
 
     Args:
-        held: What moves, each with its pose at the end.
-        estimated: The poses of all parts before it.
-        after: Where all parts are after it.
+        held: The moving solids, each with its pose at the end.
+        estimated: The poses of all parts before the transfer.
+        after: The poses of all parts after it.
     """
     step = move.step
     t = move.transfer
@@ -77,14 +77,14 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
 
 
 def _at_limit(scene: Scene, q: Array) -> str:
-    """The joint at its limit where the search for joint angles ended, at q, or nothing."""
+    """The joint at its limit at angles q, where the search for joint angles failed; empty if there is none."""
     room = scene.kinematics.limit_margins(q)
     k = int(room.argmin())
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
 
 
 def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tuple[float, str]:
-    """How deep the open gripper is in a part, [m], and in which, where it takes hold or lets go."""
+    """The largest penetration of the open gripper into a part at grasp or release, [m], and that part."""
     return max(
         _deepest_strike(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
         _deepest_strike(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
@@ -92,8 +92,14 @@ def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tupl
 
 
 def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
-    """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
-    go; zero and nothing where they have room."""
+    """The largest penetration of the open fingers into a part other than the gripped one, [m], and that part.
+
+    (0, "") if the fingers penetrate nothing.
+
+    Args:
+        beyond: Opening per finger beyond half the width of the gripped part, [m].
+        poses: Poses of all parts at grasp or release.
+    """
     boxes = list_gripper_boxes(scene.kinematics, min(grip.half_width + beyond, scene.arm.opening_m))
     T = poses[part] @ grip.T_part_tip
     depths = [
@@ -105,18 +111,18 @@ def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: P
 
 
 def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:
-    """Centre of mass of parts at poses, (3,), world, [m]; they are homogeneous."""
+    """Centre of mass of homogeneous parts at poses, (3,), world frame, [m]."""
     at = np.array([pose.apply(T, solid.centroid[None])[0] for solid, T in parts])
     volumes = np.array([solid.volume for solid, _ in parts])
     return np.asarray(volumes @ at / volumes.sum())
 
 
 def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
-    """Where a weight takes the tip, and what it holds: servos give way by their torque over their stiffness."""
+    """The world displacement of the tip and the held parts, (4, 4), by their weight at joint angles q."""
     T = scene.kinematics.forward(q)
     J = scene.kinematics.jacobian(q)
-    # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
-    # a twist of the tip, in its own frame: T exp(twist) T^-1 in the world.
+    # Joint torques of a wrench at the tip are J^T w; each servo yields by torque over stiffness, and J takes that to a
+    # twist of the tip, in its own frame: T exp(twist) T^-1 in the world.
     stiffness = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force @ T[:3, :3], np.cross(centroid - T[:3, 3], force) @ T[:3, :3]])
@@ -124,16 +130,17 @@ def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
 
 
 def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], slowly: bool) -> float:
-    """How far what is held goes beside its line where it enters: the tip, and its turn at their ends.
+    """The largest deviation of the held parts from their line during an insertion: error and rotation of the tip, [mm].
 
     Args:
-        slowly: Whether it comes as slowly as where it touches; then the turn about the way ahead of the tip counts by
-            how far aside of that the parts reach, which is nearly nothing for a peg.
+        slowly: The insertion is as slow as a guarded motion. Rotation about the axis ahead of the tip then counts by
+            the extent of the parts across that axis, which is small for a peg.
     """
-    error = motion_error(scene, SPEEDS[0 if slowly else 1])
+    error = motion_error(scene, SPEEDS[0 if slowly else 1])  # 0: touching, 1: inserting
     if error is None:
         return 0.0
     corners = [pose.apply(T, solid.bounds) - T_tip[:3, 3] for solid, T in parts]
+    # Largest distance of a corner from the tip, and from the axis ahead of the tip.
     far, aside = (
         max(float(np.linalg.norm(each @ axes, axis=1).max()) for each in corners) for axes in (np.eye(3), T_tip[:3, :2])
     )

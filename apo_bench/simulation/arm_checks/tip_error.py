@@ -1,4 +1,4 @@
-"""Measure how far the tip of an arm is off its line at a speed, by trying."""
+"""Measure the deviation of an arm's tip from a line at a given speed, by simulation."""
 
 from dataclasses import dataclass
 from typing import final
@@ -18,39 +18,41 @@ from apo_bench.simulation.robot.reach import along, limit_speed
 from apo_bench.simulation.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
-"""[m/s], at which the robot touches, inserts, and carries."""
+"""Speeds of touching, inserting and carrying, [m/s]."""
 _HIGH_M = 0.35
-"""Height at which errors are measured where the arm reaches it, else the height of its home."""
+"""Height of the measurement; if out of reach, the height of home."""
 _AHEAD_M = 0.25
-"""Farther ahead of its base than this: a line beside its axis turns it fast."""
+"""Least x distance of the measurement from the base, since a line near its axis needs fast rotation."""
 STRETCH_M = 0.15
-"""Length of the line along which the errors are measured."""
+"""Length of the measured line."""
 STAND_S = 0.3
-"""How long the arm stands before it."""
-_RESTS_M = 2e-5  # the tip rests when it is this near to its command
-_MOST_CHECKS = 10  # the arm waits for that so often: weak joints swing behind
+"""Rest of the arm before the line."""
+_RESTS_M = 2e-5  # the tip rests if it is nearer to its command
+_MOST_CHECKS = 10  # largest number of waits for rest: weak joints vibrate
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class TipError:
-    """How far the tip is off where it should be at a speed."""
+    """Deviations of the tip from its commanded poses along a line."""
 
     speed: float
     """[m/s]"""
     across_mm: float
-    """At most, beside the line."""
+    """Largest deviation across the line."""
     along_mm: float
+    """Largest deviation along the line."""
     turn_deg: float
+    """Largest rotation error."""
     tilt_deg: float
-    """How much of the turn the way ahead of the tip turns by; the rest is about that."""
+    """Largest rotation error of the axis ahead of the tip (z)."""
 
 
 @remember
 def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
-    """The error of the tip of an empty hand in free air at a speed [m/s]; None where it has no way there.
+    """The error of the tip of an empty gripper in free air at a speed [m/s]; None if the line is out of reach.
 
-    It is found by trying, once for a scene.
+    The motion is simulated once per scene and speed.
     """
     robot = Robot(scene, scene.scenario.start)
     try:
@@ -64,7 +66,7 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
 
 
 def trace(robot: Robot, line: Trajectory) -> Array:
-    """Follow a line through free air; returns where the tip really is at each step, (n, 4, 4).
+    """Follow a line through free air; return the actual poses of the tip at each step, (n, 4, 4).
 
     Raises:
         ExecutionAborted: The line leaves the arm's reach.
@@ -83,7 +85,7 @@ def trace(robot: Robot, line: Trajectory) -> Array:
 
 
 def rise(robot: Robot, speed: float) -> None:
-    """Go to where errors are measured, at a speed [m/s], and come to rest there."""
+    """Move to the pose where errors are measured, at a speed [m/s], and wait for rest."""
     up = np.array(robot.T)
     up[0, 3] = max(up[0, 3], robot.arm.base[0] + _AHEAD_M)
     up[2, 3] = _HIGH_M
@@ -99,7 +101,7 @@ def rise(robot: Robot, speed: float) -> None:
 
 
 def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
-    """Of where the tip was at each step, (n, 4, 4): beside the line, along it behind the command, and turned."""
+    """The error of actual tip poses, (n, 4, 4), at equal steps along a line."""
     direction = line.end[:3, 3] - line.start[:3, 3]
     direction = direction / np.linalg.norm(direction)
     n = len(tips)

@@ -1,1 +1,1 @@
-"""Arms that a file describes."""
+"""Arms: read their files, build their models, solve their kinematics."""

@@ -1,4 +1,4 @@
-"""An arm as data: what it can do, what its gripper does, where it stands."""
+"""An arm with its gripper as data: model, names, limits, and pose of the base (`Arm`)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,51 +12,54 @@ from apo_bench.geometry import Array, freeze, make_copyable
 from apo_bench.io import list_named_files
 
 _GRADED = 0.6
-"""A gripper of which one step of the command makes this part of its opening knows open and closed only."""
+"""If one row of a gripper's table changes the opening by this share of the range, it can only be open or closed."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
-    """What an arm can do; None: not stated."""
+    """The limits of an arm; None: not stated."""
 
     payload_kg: float | None = None
-    """Of what is held, without the gripper."""
+    """Largest mass of the held parts, without the gripper."""
     speed_rad_s: Array | None = None
-    """(joints,), the fastest each may turn."""
+    """(joints,), largest speed of each joint."""
     torque_nm: Array | None = None
-    """(joints,), the most each can push; infinite where not stated."""
+    """(joints,), largest torque of each joint; infinite if not stated."""
     fingers_m_s: float = 0.28
-    """How fast the command of each finger moves at most."""
+    """Largest speed of the command of each finger."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """Measured from closed to open; openings are of each finger, half the distance between the pads, [m]."""
+    """A measured gripper: a table from closed to open.
+
+    Openings are per finger, half the distance between the pads, [m].
+    """
 
     actuators: tuple[str, ...]
     joints: tuple[str, ...]
     opening: Array
-    """(n,), ascending; below zero where pads would be inside each other."""
+    """(n,), ascending; negative if the pads would penetrate each other."""
     commands: Array
-    """(n, actuators), in their own units."""
+    """(n, actuators): commands of the actuators at each opening, in their own units."""
     states: Array
-    """(n, joints), [rad] or [m]."""
+    """(n, joints): joint positions of the empty gripper at each opening, [rad] or [m]."""
     force_n: float
-    """How hard each pad pushes on a part of half its opening."""
+    """Force of each pad on a part as wide as half the opening."""
     squeeze_m: float
-    """How far inside the part its fingers are sent for that, each."""
+    """Depth inside the part to which each finger is commanded for that force."""
     friction: float
-    """Of what pushes on that part."""
+    """Coefficient of friction of the pads."""
     seconds: float
-    """How long it takes to close or open at most."""
+    """Longest time to close or open."""
     pads: tuple[str, str]
-    """A geom of each side."""
+    """Names of a geom of the left and of the right pad."""
     thick_m: float
-    """How much farther apart the middles of these are than the surfaces that hold."""
+    """Distance of the middles of these geoms, less that of their gripping surfaces."""
 
     def __post_init__(self) -> None:
         n = len(self.opening)
@@ -64,28 +67,29 @@ class Hand:
 
     @cached_property
     def graded(self) -> bool:
-        """Whether it can be opened by any amount; else it is open or closed."""
+        """Whether the gripper can be opened by any amount; otherwise it is either open or closed."""
         steps = np.diff(self.opening)
         return bool(steps.max() < _GRADED * steps.sum())
 
     def command(self, opening: float) -> Array:
-        """(actuators,), at which the fingers of the empty hand stand at an opening; all of it, if there is no more."""
+        """The commands, (actuators,), for an opening of the empty gripper; at most fully open."""
         return self._at(self.commands, opening)
 
     def state(self, opening: float) -> Array:
-        """(joints,), at an opening of the empty hand."""
+        """The joint positions, (joints,), at an opening of the empty gripper."""
         return self._at(self.states, opening)
 
     def of_command(self, ctrl: Array) -> float:
-        """The opening that is commanded, [m]."""
+        """The opening, [m], that actuator commands, (actuators,), demand."""
         k = int(np.abs(self.commands[-1] - self.commands[0]).argmax())
         # The actuator whose command changes most determines the opening; its commands may fall while the opening rises.
         order = np.argsort(self.commands[:, k], kind="stable")
         return float(np.interp(float(ctrl[k]), self.commands[order, k], self.opening[order]))
 
     def _at(self, rows: Array, opening: float) -> Array:
+        """A table, (n, m), interpolated at an opening, (m,); closed or open if the gripper is not graded."""
         if not self.graded:
-            return np.array(rows[-1 if opening > self.opening[0] else 0])
+            return np.array(rows[-1 if opening > self.opening[0] else 0])  # -1: open, 0: closed
         return np.array([np.interp(opening, self.opening, column) for column in rows.T])
 
 

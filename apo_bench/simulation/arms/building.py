@@ -1,4 +1,4 @@
-"""Build an `Arm` from its description."""
+"""Build an `Arm` from its description: mount the gripper, find joints and pads, choose a home, add servos."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,15 +26,19 @@ _TIP = "tip"
 _GRIPPER = "gripper/"
 _FINGER_ARMATURE = 1e-4  # [kg m^2]
 _FINGER_DAMPING = 0.02  # [Nm s/rad]
-"""Of finger joints that are neither damped nor geared: their light links would rattle without end."""
+"""Added to finger joints that have neither, since their light links would vibrate without end."""
 _COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
 _COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
-_DEFAULT_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they give way by 1 mm to some newtons
+_DEFAULT_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they yield 1 mm to a few newtons
 _USUAL_FINGERS_MM_S = 50.0
-"""As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
-less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
-_MOST_BUILT = 8
+"""Default speed of each finger, as the hand of a Panda.
+
+Pads that meet a part at 0.28 m/s penetrate up to 0.8 mm. If they overlap another wall of the part by less, MuJoCo
+pushes them off that one, and the pad sticks between two walls.
+"""
+_MOST_BUILT = 8  # arms in the cache
 _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
+"""Cache: (path, time of change) of each file of an arm -> the arm."""
 
 
 @check_arguments
@@ -57,7 +61,7 @@ def read_arm(path: str | Path) -> Arm:
 
 
 def read_described(description: ArmDescription) -> Arm:
-    """The arm of a description, as it was built when its files were as they are now."""
+    """The arm of a description, from the cache if its files have not changed."""
     times = tuple((str(each), each.stat().st_mtime_ns) for each in model_files(description) if each.is_file())
     if times not in _BUILT:
         while len(_BUILT) >= _MOST_BUILT:
@@ -67,10 +71,10 @@ def read_described(description: ArmDescription) -> Arm:
 
 
 def build_arm(description: ArmDescription) -> Arm:
-    """Put an arm together.
+    """Build an arm with a gripper file; an arm with stated slides is used as it is.
 
     Raises:
-        InputError: Its models do not fit the description, or cannot be used.
+        InputError: Its models do not match the description, or cannot be used.
     """
     mjcf = description.model_file
     spec = load_model(mjcf, "arm")
@@ -131,7 +135,12 @@ def build_arm(description: ArmDescription) -> Arm:
 
 
 def _with_tip(spec: Any, mount: str, T: Array) -> str:
-    """The whole as MJCF, with the site of the tip."""
+    """Add the site of the tip to the model and return it as MJCF text.
+
+    Args:
+        mount: The body that carries the gripper.
+        T: (4, 4), the tip in that body.
+    """
     for site in list(spec.sites):
         if site.name == _TIP:
             site.name = f"{_TIP}_of_the_model"
@@ -142,7 +151,12 @@ def _with_tip(spec: Any, mount: str, T: Array) -> str:
 
 
 def mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
-    """Attach the gripper of another file to the flange, a body."""
+    """Attach the gripper of another file to the flange.
+
+    Args:
+        flange: The last body of the arm.
+        T_flange: (4, 4), the flange in that body.
+    """
     if description.gripper_file is not None:
         hand = load_model(description.gripper_file, "gripper")
         hand.option = spec.option
@@ -155,7 +169,10 @@ def mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescr
 
 
 def make_passive(spec: Any, joints: Sequence[str]) -> None:
-    """Nothing falls, nothing of the arm touches itself or what it stands on, and fingers do not rattle or give way."""
+    """Change the model so that only contacts with parts and the drives act on the arm.
+
+    Gravity is compensated, the arm does not collide with itself or its base, and undriven finger joints are damped.
+    """
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _DEFAULT_SOLREF:
             equality.solref[:] = _COUPLED_SOLREF
@@ -164,8 +181,10 @@ def make_passive(spec: Any, joints: Sequence[str]) -> None:
         body.gravcomp = 1.0
     for geom in spec.geoms:
         if geom.contype or geom.conaffinity:
+            # With conaffinity 0 two geoms of the arm never collide.
             geom.contype = 1
             geom.conaffinity = 0
+    # The body of the first joint, and all bodies that no joint moves, collide with nothing.
     standing = spec.joint(joints[0]).parent
     for body in spec.bodies:
         if body.name == standing.name or not _turns(body, joints):
@@ -194,12 +213,15 @@ def _drive(
     kept: Sequence[str],
     description: ArmDescription,
 ) -> bool:
-    """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos.
+    """Keep the arm's own position actuators if each is stiff and named like its joint, else replace them by servos.
 
     Args:
         inertia: (joints,), at each joint, [kg m^2].
-        drives: Of each joint; takes the torques of the description.
+        drives: Drive of each joint; torques of the description are entered into it.
         kept: Actuators of the gripper, which stay.
+
+    Returns:
+        Whether the arm's own actuators are kept.
     """
     torques = description.of_each_joint("torque_nm", len(joints))
     if torques is not None:
@@ -216,11 +238,12 @@ def _drive(
 
 
 def usual_home(model: Any, joints: Sequence[str]) -> Array:
-    """The middle of the range of each joint, or zero."""
+    """The middle of the range of each joint, or zero without limits, (joints,), [rad]."""
     at = [model.joint(name).id for name in joints]
     low, high = model.jnt_range[at].T
     return np.where(model.jnt_limited[at].astype(bool), (low + high) / 2, 0.0)
 
 
 def _quaternion(T: Array) -> Array:
+    """The rotation of a pose as a quaternion, w first."""
     return np.asarray(pose.pack(T)[3:])

@@ -1,4 +1,4 @@
-"""The TOML file that describes an arm: what its MJCF does not show."""
+"""Read the TOML file of an arm, which states what its MJCF file does not show."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.gripper_file import gripper_path
 
 _USUAL_BASE = Pose(at_mm=(-450.0, 0.0, 0.0))
-"""Reaches the table from behind its middle."""
+"""Default base: behind the middle of the table."""
 Names = Annotated[tuple[Text, ...], Meta(min_length=1, max_length=16)]
 Numbers = Annotated[tuple[Finite, ...], Meta(min_length=1, max_length=16)]
 Speed = Annotated[float, Meta(gt=0.0, le=3600.0)]
@@ -21,25 +21,25 @@ Torque = Annotated[float, Meta(gt=0.0, le=1e5)]
 
 
 class GripperDescription(FileTable, frozen=True, kw_only=True):
-    """The gripper and its drive: a gripper file as `hand`, or `slides`.
+    """The table `[gripper]`: a gripper file as `hand`, or a gripper of `slides`.
 
-    Slides are a finger on each side that slides, both driven by one actuator; the model is used as it is.
+    A gripper of slides has one sliding finger on each side, both driven by one actuator; its model is used as it is.
     """
 
     hand: Text | None = None
-    """What it does: the short name or the path of a gripper file."""
+    """Short name or path of the gripper file with its measured table."""
     mjcf: Text | None = None
-    """None: it is part of the arm's file."""
+    """Model file of the gripper; None: it is part of the arm's model."""
     mount: Pose = Pose(at_mm=(0.0, 0.0, 0.0))
-    """Its frame in the flange."""
+    """Pose of the gripper in the flange."""
     speed_mm_s: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
-    """The fastest each pad moves; None: 50, as a Franka Hand."""
+    """Largest speed of each pad; None: 50, as a Franka Hand."""
     slides: Names | None = None
     """The slide joints of the fingers, zero when closed."""
     tip: Text | None = None
     """The site between the fingertips: z points ahead, x along the closing direction."""
     opening_mm: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
-    """How far each finger opens."""
+    """Widest opening per finger."""
     actuators: tuple[Text] | None = None
     """The position actuator that drives both fingers."""
 
@@ -63,22 +63,22 @@ class ArmTable(FileTable, frozen=True, kw_only=True):
     """A site or a body; None: the last body of the one chain of hinges."""
     joints: Names | None = None
     home_deg: Numbers | None = None
-    """None: searched for."""
+    """None: chosen by a search."""
     base: Pose | None = None
-    """Where the base stands; None: behind the middle of the table, or nearer where the arm is short."""
+    """Pose of the base; None: behind the middle of the table, or nearer for a short arm."""
     payload_kg: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
-    """Of what is held, without the gripper."""
+    """Largest mass of the held parts, without the gripper."""
     speed_deg_s: Speed | Annotated[tuple[Speed, ...], Meta(min_length=1)] | None = None
-    """The fastest each joint may turn."""
+    """Largest speed of all joints, or of each."""
     torque_nm: Torque | Annotated[tuple[Torque, ...], Meta(min_length=1)] | None = None
-    """The most each joint may push; None: as the model says."""
+    """Largest torque of all joints, or of each; None: as in the model."""
 
 
 class ArmDescription(ArmTable, frozen=True, kw_only=True):
-    """An arm file, or what stands for one."""
+    """The content of an arm file, or its equivalent for an arm of a collection."""
 
     file: Path
-    """Of which messages speak; other files are named relative to it."""
+    """The arm file, for messages; other files are named relative to it."""
 
     @property
     def model_file(self) -> Path:
@@ -92,19 +92,19 @@ class ArmDescription(ArmTable, frozen=True, kw_only=True):
 
     @property
     def hand_file(self) -> Path | None:
-        """The gripper file; None where slides are stated."""
+        """The gripper file; None if slides are stated."""
         return None if self.gripper.hand is None else gripper_path(self.gripper.hand, self.file.parent)
 
     @property
     def base_frame(self) -> Array:
-        """Where the base stands, (4, 4), world, [m]."""
+        """The pose of the base, (4, 4), world frame, [m]."""
         return (self.base or _USUAL_BASE).matrix
 
     def of_each_joint(self, key: Literal["speed_deg_s", "torque_nm"], count: int) -> Array | None:
-        """What a key states of each of so many joints, (count,); None where it is not stated.
+        """The stated values of a key for each of `count` joints, (count,); None if the key is not stated.
 
         Raises:
-            InputError: It is stated of another number of joints.
+            InputError: The number of values is neither 1 nor `count`.
         """
         stated = getattr(self, key)
         if stated is None:
@@ -117,7 +117,7 @@ class ArmDescription(ArmTable, frozen=True, kw_only=True):
 
 
 def read_description(path: Path) -> ArmDescription:
-    """The description in an arm file.
+    """Read an arm file.
 
     Raises:
         InputError: A key or a value that an arm file cannot have, naming file and key.

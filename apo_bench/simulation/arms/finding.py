@@ -1,6 +1,6 @@
-"""Arms by name: those that come with the benchmark, those of a file, of a collection, of a module.
+"""Find an arm by name: one that comes with the benchmark, a file, an arm of a collection, or a plugin `module:name`.
 
-Collections are MuJoCo Menagerie and robosuite, where they are installed. Nothing is downloaded.
+Collections are MuJoCo Menagerie and robosuite, if installed. Nothing is downloaded.
 """
 
 import importlib.util
@@ -21,10 +21,12 @@ from apo_bench.simulation.arms.description import ArmDescription, GripperDescrip
 from apo_bench.simulation.arms.loading import load_model
 
 _MENAGERIE = "APO_BENCH_MENAGERIE"
+"""Environment variable with the folder of MuJoCo Menagerie."""
 _ROBOSUITE = "APO_BENCH_ROBOSUITE"
-"""Variables that name their folders."""
-_CACHE = Path("robot_descriptions") / "mujoco_menagerie"
-_2F85 = Path("robotiq_2f85") / "2f85.xml"
+"""Environment variable with the folder of robosuite."""
+_CACHE = Path("robot_descriptions") / "mujoco_menagerie"  # folder of Menagerie in the user's cache
+_2F85 = Path("robotiq_2f85") / "2f85.xml"  # Menagerie's gripper for arms without one
+# Words by which the name of a joint or body shows that it belongs to a gripper.
 _WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver", "jaw")
 _GRIPPERS = MappingProxyType(
     {
@@ -36,24 +38,27 @@ _GRIPPERS = MappingProxyType(
         "xarm7": ("xarm7_gripper", "robosuite_xarm7"),
     }
 )
-"""Of robosuite's arms, the gripper that each has there, and its gripper file."""
+"""Arm of robosuite -> its usual gripper there, and the gripper file of that."""
 _HANDS = MappingProxyType({"franka_emika_panda": "franka_hand"})
-"""Of Menagerie's arms with a gripper, its gripper file."""
+"""Arm of Menagerie with a gripper -> its gripper file."""
 _NAMES = ("six_axis", "ur5e_primitive", "panda_primitive")
 """Arms that come with the benchmark, as arm files."""
 
 
 def arm_names() -> tuple[str, ...]:
-    """The short names of arms."""
+    """The short names of the arms that come with the benchmark."""
     return _NAMES
 
 
 def find_arm(name: str | Arm) -> Arm:
-    """An arm by short name, `FILE.toml`, `menagerie:NAME`, `robosuite:NAME`, `module:name`, or as the object itself.
+    """Find an arm by short name, `FILE.toml`, `menagerie:NAME`, `robosuite:NAME` or `module:name`.
+
+    Args:
+        name: The name, or an `Arm`, which is returned as it is.
 
     Raises:
-        InputError: It is not known; its collection is not there, with the command that fetches it; it cannot be used as
-            it is.
+        InputError: The arm is unknown, its collection is not installed (with the command that fetches it), or it cannot
+            be used.
     """
     if isinstance(name, Arm):
         return name
@@ -84,6 +89,7 @@ def find_arm(name: str | Arm) -> Arm:
 
 
 def _of_menagerie(name: str) -> ArmDescription:
+    """The description of an arm of MuJoCo Menagerie, with its own gripper or a Robotiq 2F-85."""
     root = next((each for each in _menageries() if each.is_dir()), None)
     if root is None:
         raise InputError(
@@ -91,7 +97,7 @@ def _of_menagerie(name: str) -> ArmDescription:
             f"https://github.com/google-deepmind/mujoco_menagerie' and name its folder in {_MENAGERIE}."
         )
     require_known("arm", name, [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))], place=root)
-    plain = name.replace("_", "").lower()
+    plain = name.replace("_", "").lower()  # the file of arm `franka_emika_panda` is `panda.xml`
     files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
     require(files, f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file.")
     if _has_fingers(files[0]):
@@ -106,6 +112,7 @@ def _of_menagerie(name: str) -> ArmDescription:
 
 
 def _of_robosuite(name: str) -> ArmDescription:
+    """The description of an arm of robosuite with its usual gripper there."""
     root = _robosuite()
     if root is None:
         raise InputError(
@@ -122,12 +129,18 @@ def _of_robosuite(name: str) -> ArmDescription:
 
 
 def _foreign_arm(mjcf: Path, gripper: Path | None, hand: str, flange: str | None = None) -> ArmDescription:
-    """The description of an arm without an arm file."""
+    """The description of an arm without an arm file.
+
+    Args:
+        gripper: Model file of the gripper; None: it is part of the arm's model.
+        hand: Name of the gripper file.
+    """
     described = GripperDescription(hand=hand, mjcf=None if gripper is None else str(gripper.absolute()))
     return ArmDescription(schema="apo-bench/arm/1", file=mjcf, mjcf=mjcf.name, flange=flange, gripper=described)
 
 
 def _menageries() -> Iterator[Path]:
+    """Folders where MuJoCo Menagerie may be: that of the variable, else that in the cache."""
     if named := os.environ.get(_MENAGERIE):
         yield Path(named)
         return
@@ -135,6 +148,7 @@ def _menageries() -> Iterator[Path]:
 
 
 def _robosuite() -> Path | None:
+    """The folder of robosuite, from the variable or the installed package; None if there is none."""
     if named := os.environ.get(_ROBOSUITE):
         root = Path(named)
         return root if (root / "models" / "assets").is_dir() else None
@@ -143,7 +157,7 @@ def _robosuite() -> Path | None:
 
 
 def _has_fingers(mjcf: Path) -> bool:
-    """Whether a joint slides, or it or its body is by its name of a gripper."""
+    """Whether a model has a gripper: a slide joint, or a joint or body with a name of a gripper."""
     spec = load_model(mjcf, "arm")
     if any(joint.type == mujoco.mjtJoint.mjJNT_SLIDE for joint in spec.joints):
         return True

@@ -1,4 +1,4 @@
-"""The TOML file of a gripper: how far it opens at which command, and how hard it pushes."""
+"""Read the TOML file of a gripper: its table of openings and commands, and its force."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -24,28 +24,28 @@ class GripperTable(FileTable, frozen=True, kw_only=True):
     mount: Text | None = None
     """The body that carries the fingers; None: the flange of the arm."""
     tip: AnyPose
-    """Between the fingertips, in the mount: z ahead, x along the closing direction."""
+    """Frame between the fingertips, in the mount: z ahead, x along the closing direction."""
     actuators: tuple[Text, ...]
     joints: tuple[Text, ...]
     pads: tuple[Text, Text]
-    """A geom of each side, or a body, of which its first box counts."""
+    """A geom of each side, or a body, whose first box is the pad."""
     pads_apart_mm: Finite
-    """How much farther apart the middles of these geoms are than the surfaces that hold."""
+    """Distance of the middles of these geoms, less that of their gripping surfaces."""
     force_n: Positive
-    """How hard each pad pushes on a part of half the opening."""
+    """Force of each pad on a part as wide as half the opening."""
     squeeze_mm: NotNegative
-    """How far inside the part its fingers are sent for that, each."""
+    """Depth inside the part to which each finger is commanded for that force."""
     friction: NotNegative
     seconds: Positive
-    """How long it takes to close or open at most."""
+    """Longest time to close or open."""
     drive_scale: Positive = 1.0
-    """How many times as strong as in the model its drive is."""
+    """Factor on the strength of the drive in the model."""
     opening_mm: Numbers
-    """Ascending; below zero where pads would be inside each other."""
+    """Ascending; negative if the pads would penetrate each other."""
     commands: Rows
-    """Of the actuators at each opening, in their own units."""
+    """Commands of the actuators at each opening, in their own units."""
     states: Rows
-    """Of the joints at each opening of the empty hand, [rad] or [m]."""
+    """Joint positions of the empty gripper at each opening, [rad] or [m]."""
 
     def __post_init__(self) -> None:
         n = len(self.opening_mm)
@@ -57,7 +57,7 @@ class GripperTable(FileTable, frozen=True, kw_only=True):
             raise ValueError(f"'states' needs {n} rows of {len(self.joints)} numbers.")
 
     def tip_frame(self, path: Path) -> Array:
-        """The tip in the mount, (4, 4), [m].
+        """The pose of the tip in the mount, (4, 4), [m].
 
         Args:
             path: The file, for messages.
@@ -65,11 +65,11 @@ class GripperTable(FileTable, frozen=True, kw_only=True):
         return self.tip.matrix(f"{path}, tip")
 
     def hand(self, prefix: str, pads: tuple[str, str]) -> Hand:
-        """The hand of an arm.
+        """The gripper as part of an arm.
 
         Args:
-            prefix: Of the names of the gripper in the arm.
-            pads: The geoms of the arm.
+            prefix: Prefix of the gripper's names in the arm.
+            pads: Names of the pad geoms in the arm.
         """
         return Hand(
             actuators=tuple(prefix + name for name in self.actuators),
@@ -100,7 +100,7 @@ def gripper_path(name: str, place: Path) -> Path:
 
 
 def read_gripper(path: Path) -> GripperTable:
-    """What a gripper file states.
+    """Read a gripper file.
 
     Raises:
         InputError: A key or a value that a gripper file cannot have, naming file and key.

@@ -1,4 +1,4 @@
-"""Find in the model of an arm what its gripper file names, and scale its drive."""
+"""Find the names of a gripper file in the model of its arm, and scale the gripper's drive."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from apo_bench.simulation.arms.arm import Hand
 
 
 def find_pad(model: Any, name: str, path: Path) -> str:
-    """The geom of a pad: the one of that name, or the first box of the body of that name.
+    """The name of the geom of a pad: the geom called `name`, or the first box of the body called `name`.
 
     Raises:
         InputError: There is none; `path` is the gripper file.
@@ -27,7 +27,7 @@ def find_pad(model: Any, name: str, path: Path) -> str:
 
 
 def check_names(model: Any, hand: Hand, mount: str, path: Path) -> None:
-    """Refuse a gripper file that names what the arm has not; `path` is that file."""
+    """Raise an `InputError` if the gripper file `path` names a body, actuator or joint that the arm does not have."""
     require_known("body", mount, [model.body(i).name for i in range(model.nbody)], place=path)
     for name in hand.actuators:
         require_known("actuator", name, [model.actuator(i).name for i in range(model.nu)], place=path)
@@ -36,13 +36,13 @@ def check_names(model: Any, hand: Hand, mount: str, path: Path) -> None:
 
 
 def scale_drive(spec: Any, actuators: Sequence[str], by: float) -> None:
-    """Make the drive of a gripper stronger: gains, damping and limits of its actuators, and limits of their joints.
+    """Scale the strength of a gripper's drive: gains, damping and limits of its actuators, limits of their joints.
 
-    A damping above zero is a ratio (`dampratio`), which needs no scale.
+    A positive damping is a ratio (`dampratio`), which needs no scaling.
     """
     for name in actuators if by != 1.0 else ():
         actuator = spec.actuator(name)
-        damping = actuator.biasprm[2]
+        damping = actuator.biasprm[2]  # gains and bias of a position actuator: (0, -kp, -kd)
         actuator.gainprm[:3] = by * actuator.gainprm[:3]
         actuator.biasprm[:2] = by * actuator.biasprm[:2]
         actuator.biasprm[2] = damping if damping > 0.0 else by * damping

@@ -1,4 +1,4 @@
-"""Find the joint angles at which an arm waits over the table with most room."""
+"""Choose the home of an arm: joint angles over the table from which it reaches most of the table."""
 
 from dataclasses import replace
 from itertools import product
@@ -11,40 +11,40 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame
 
-_AT = (-0.05, 0.0, 0.30)  # place of the waiting tip, [m]
+_AT = (-0.05, 0.0, 0.30)  # position of the tip at home, [m]
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
-"""Places of the tip, [m], at which there should be room."""
-_TURNS = (-1.6, 0.0, 1.6)  # turns from the way it waits, [rad], at which there should be room
-_WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)  # ways it may wait, [rad]
+"""Positions of the tip, [m], that should be in reach."""
+_TURNS = (-1.6, 0.0, 1.6)  # yaws of the tip relative to home, [rad], that should be in reach
+_WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)  # candidate yaws of the tip at home, [rad]
 _MOST_PLACES = len(_TABLE) * len(_TURNS)
 _NEARER_M = (-0.4, -0.3, -0.2, -0.1)
-"""Places of a base behind the middle of the table, of an arm that reaches at most half of it."""
-_STANDS_M = (0.0, 0.1, 0.2)  # heights of such a base
+"""Candidate x of the base, for an arm that reaches at most half of the table from the default base."""
+_STANDS_M = (0.0, 0.1, 0.2)  # candidate heights of that base
 _TRIES = 40  # random starts of the search
-_QUICK_TRIES = 16  # as `_TRIES`, for each other place of the base
-_WIDEST = 3.0  # [rad]: no start is farther from zero
-_SAME_RAD = 0.2  # homes that differ by less are one
-_TABLE_ROOM_M = 0.02  # links stay so far above the table
-_NEAR = 0.4  # every other start is so near to the middle of the ranges
+_QUICK_TRIES = 16  # the same for each other position of the base
+_WIDEST = 3.0  # [rad]: bound of the joint angles of a start
+_SAME_RAD = 0.2  # homes with smaller differences are equal
+_TABLE_ROOM_M = 0.02  # least height of the links' centres of mass
+_NEAR = 0.4  # share of the joint range from which every other start is drawn
 _ENOUGH_RAD = 0.3
-"""More room to a limit than this counts less than links that are high above the table."""
+"""A larger margin to joint limits does not count; then higher links are preferred."""
 
 
 def tip_down(at: Array, turn: float = 0.0) -> Array:
-    """A tip that looks down, (4, 4); at turn 0 its fingers close along x."""
+    """The pose, (4, 4), of a tip that points down; at turn 0 [rad] its fingers close along x."""
     c = np.cos(turn)
     s = np.sin(turn)
     return frame(np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0]), at)
 
 
 def with_home(arm: Arm, base_is_stated: bool) -> Arm:
-    """The arm with the joint angles at which it waits: from there the tip reaches most of the table with most room.
+    """The arm with the home from which the tip reaches most of the table, with the largest margin to joint limits.
 
     Args:
-        base_is_stated: Else the base of an arm that is short stands nearer, or on a stand, where most is reached.
+        base_is_stated: If not, the base of a short arm moves nearer or onto a stand, where it reaches most.
 
     Raises:
-        InputError: The arm does not reach over the table at all.
+        InputError: The tip does not reach its home position at all.
     """
     best = _home(arm, _TRIES)
     if not base_is_stated and (best is None or best[0] <= _MOST_PLACES / 2):
@@ -64,7 +64,11 @@ def with_home(arm: Arm, base_is_stated: bool) -> Arm:
 
 
 def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
-    """How many places on the table are reached from the best home, and that, [rad]; None where there is no home."""
+    """Search for the best home by random starts.
+
+    Returns:
+        (number of positions on the table in reach, home angles [rad]), or None if there is no home.
+    """
     kinematics = Kinematics(arm, posture=False)
     rng = np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.joint_range)
@@ -72,6 +76,7 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
     for i in range(tries):
         start = rng.uniform(low, high)
         near = _NEAR * (i > 0)
+        # Even tries start near the middle of the ranges (the first exactly there), odd ones anywhere.
         start = start if i % 2 else (low + high) / 2 + near * (start - (low + high) / 2)
         way = _WAYS[i // 2 % len(_WAYS)]
         q = kinematics.inverse(tip_down(np.array(_AT), way), start, 25)
@@ -87,7 +92,7 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
 
 
 def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, float]:
-    """Places reached, room to the limits as far as it is needed, height of the joints."""
+    """The worth of a home, compared in order: positions in reach, margin to limits (capped), mean link height."""
     reached, least = room(kinematics, q, way)
     kinematics.forward(q)
     moved = kinematics.model.body_jntnum > 0
@@ -95,10 +100,10 @@ def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, fl
 
 
 def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
-    """How many places on the table are reached from home, and the least distance of a joint from its limit, [rad].
+    """The number of table positions in reach from home, and the least distance of a joint from its limit there, [rad].
 
     Args:
-        way: How the tip is turned there, [rad].
+        way: Yaw of the tip at home, [rad].
     """
     kinematics.keep_near(home)
     reached = 0
@@ -113,13 +118,13 @@ def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
 
 
 def _unwind(q: Array, low: Array, high: Array) -> Array:
-    """The same place with every joint less than half a turn from zero, where its limits let it be."""
+    """Joint angles of the same pose with every joint within half a turn of zero, if its limits allow."""
     near = (q + np.pi) % (2 * np.pi) - np.pi
     return np.where((near >= low) & (near <= high), near, q)
 
 
 def _in_table(kinematics: Kinematics, q: Array) -> bool:
-    """Whether the centre of mass of a link lies in the table."""
+    """Whether the centre of mass of a link is in the table."""
     kinematics.forward(q)
     moved = kinematics.model.body_jntnum[1:] > 0
     return bool((kinematics.configuration.data.xipos[1:][moved, 2] < _TABLE_ROOM_M).any())

@@ -1,4 +1,4 @@
-"""Forward and inverse kinematics of an arm by mink, on a model of the arm alone."""
+"""Forward and inverse kinematics of an arm, with mink, on a model of the arm alone."""
 
 from typing import Any
 
@@ -15,20 +15,26 @@ from apo_bench.simulation.frames import frame, quaternion
 class Kinematics:
     """Forward and inverse kinematics of the arm alone."""
 
-    POSITION_M = 1e-6
-    ANGLE_RAD = 1e-5
+    POSITION_M = 1e-6  # tolerance of a solution
+    ANGLE_RAD = 1e-5  # tolerance of a solution
     DAMPING = 1e-9
     GAIN = 0.95
-    """A step takes at most this part of the way to a joint's limit."""
+    """Largest share of the distance to a joint's limit in one step."""
 
     LEAN_RAD = 0.035
+    """Largest rotation error of an arm of five joints, which cannot reach all orientations."""
     LEANING = 1e-3
-    """An arm of five joints holds the tip at its place, turned as near as it can: so much off at most, by this cost."""
+    """Cost of that rotation error, against 1 for the position."""
 
     POSTURE = 2e-4
-    """How much an arm with more than six joints prefers its home, as a cost: the tip is off by some 1e-8 m for it."""
+    """Cost of the distance from home for an arm with more than six joints; it moves the tip by about 1e-8 m."""
 
     def __init__(self, arm: Arm, posture: bool = True) -> None:
+        """Build the model of an arm alone.
+
+        Args:
+            posture: Whether an arm with more than six joints prefers its home.
+        """
         self.arm = arm
         self.model = _alone(arm)
         self.configuration = mink.Configuration(self.model)
@@ -36,7 +42,7 @@ class Kinematics:
         self.adr = self.model.jnt_qposadr[self.ids]
         self.site = self.model.site(arm.tip).id
         self._leans = len(arm.joints) < 6
-        turning = self.LEANING if self._leans else 0.3
+        turning = self.LEANING if self._leans else 0.3  # cost of the rotation error
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=turning)
         self._cost: Array = self._task.cost[:, None]
         self._damping: Array = self.DAMPING * np.eye(self.model.nv)
@@ -51,7 +57,7 @@ class Kinematics:
             self.keep_near(arm.home)
 
     def keep_near(self, home: Array) -> None:
-        """Of arms with more than six joints: which joint angles they prefer from now on, [rad]."""
+        """Set the joint angles, [rad], that an arm with more than six joints prefers from now on."""
         if len(self.adr) <= 6:
             return
         cost = np.zeros(self.model.nv)
@@ -63,7 +69,7 @@ class Kinematics:
 
     @property
     def first_link(self) -> str:
-        """The first body of the arm that moves: everything that moves hangs on it."""
+        """The first moving body of the arm; all other moving bodies descend from it."""
         tree = self.model.body_treeid[self.model.body(self.arm.mount).id]
         return str(self.model.body(int(self.model.tree_bodyadr[tree])).name)
 
@@ -73,17 +79,17 @@ class Kinematics:
         return self._range[:, self.ids]
 
     def limit_margins(self, q: Array) -> Array:
-        """How far each joint is from its nearer limit, (joints,), [rad]."""
+        """Distance of each joint from its nearer limit, (joints,), [rad]."""
         low, high = self.joint_range
         return np.asarray(np.minimum(q - low, high - q))
 
     @property
     def last(self) -> Array:
-        """Where the last search for joint angles ended, or the angles of the last call, (joints,), [rad]."""
+        """The joint angles at the end of the last call, also of a search that failed, (joints,), [rad]."""
         return np.array(self.configuration.q[self.adr])
 
     def forward(self, q: Array) -> Array:
-        """The pose of the tip, (4, 4), world."""
+        """The pose of the tip, (4, 4), world frame, at joint angles q, (joints,), [rad]."""
         data = self.configuration.data
         self._full[self.adr] = q
         data.qpos[:] = self._full
@@ -96,23 +102,28 @@ class Kinematics:
         return self._jacobian()[:, self.model.jnt_dofadr[self.ids]]
 
     def inverse_jacobian(self, q: Array) -> Array:
-        """How the joints turn with the tip, (joints, 6), [rad] per [m, rad] of a twist in its own frame.
+        """The pseudoinverse of the Jacobian, (joints, 6): joint rotations, [rad], per twist of the tip, in its frame.
 
-        An arm of five joints keeps the place of the tip before its turn, as `inverse` does.
+        For an arm of five joints the position of the tip has priority over its rotation, as in `inverse`.
         """
         return np.asarray(np.linalg.pinv(self._cost * self.jacobian(q)) * self._cost[:, 0])
 
     def _jacobian(self) -> Array:
-        """The body Jacobian of the tip where `mj_kinematics` found it, (6, all joints of the model)."""
+        """The body Jacobian of the tip for all joints of the model, (6, nv), after `mj_kinematics`."""
         data = self.configuration.data
         mujoco.mj_comPos(self.model, data)
         mujoco.mj_jacSite(self.model, data, self._J[0], self._J[1], self.site)
         return np.asarray((data.site_xmat[self.site].reshape(3, 3).T @ self._J).reshape(6, -1))
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
-        """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there.
+        """Joint angles, (joints,), that bring the tip to T, by Newton steps from `near`; None if they do not converge.
 
-        The turn about one axis is left to an arm of five joints, within `LEAN_RAD`.
+        An arm of five joints may miss the rotation by `LEAN_RAD`.
+
+        Args:
+            T: (4, 4), world frame, [m].
+            near: Start of the search, (joints,), [rad].
+            turns: Largest number of Newton steps.
         """
         data = self.configuration.data
         target = quaternion(T)
@@ -128,6 +139,7 @@ class Kinematics:
             if step is None:
                 return None
             longest = float(np.abs(step).max())
+            # Five joints: the position is reached and the rotation no longer improves.
             if self._leans and max(map(abs, off[:3])) < self.POSITION_M and longest < self.ANGLE_RAD:
                 return self.last if max(map(abs, off[3:])) < self.LEAN_RAD else None
             # No joint turns by more than half a radian in one step: far from the target the linearisation is wrong.
@@ -135,7 +147,7 @@ class Kinematics:
         return None
 
     def _error(self, position: Array, turned: Array) -> Array:
-        """How far the tip is from a place, (3,), and from a quaternion: (6,), in its own frame, [m] and [rad]."""
+        """The error of the tip to a position, (3,), and a quaternion: (6,), in the frame of the tip, [m] and [rad]."""
         data = self.configuration.data
         error = np.empty(6)
         error[:3] = (position - data.site_xpos[self.site]) @ data.site_xmat[self.site].reshape(3, 3)
@@ -144,10 +156,10 @@ class Kinematics:
         return error
 
     def _step(self, error: Array, T: Array) -> Array | None:
-        """The step of all joints towards T; None if there is none.
+        """One Newton step of all joints, (nv,), towards T; None if the programme has no solution.
 
-        mink's quadratic programme without limits is a linear system. Where its solution keeps them, it is that of the
-        programme too.
+        Without limits, mink's quadratic programme is a linear system. If its solution keeps the limits, it also solves
+        the programme.
         """
         # The least of 1/2 s^T H s - c^T s with H = J^T W J and c = J^T W error: without limits H s = c. A little
         # damping on the diagonal keeps H regular where the arm is straight.
@@ -158,7 +170,7 @@ class Kinematics:
             more = self._posture.compute_qp_objective(self.configuration)
             H = H + more[0]
             c = c - more[1]
-        step: Any = np.linalg.solve(H, c)
+        step: Any = np.linalg.solve(H, c)  # violates no limit in most cases, so the programme below is rare
         low, high = self.GAIN * (self._range - self.configuration.data.qpos)
         if (step >= low).all() and (step <= high).all():
             return step
@@ -172,7 +184,7 @@ class Kinematics:
 
 
 def _alone(arm: Arm) -> Any:
-    """The model of the arm where it stands, and nothing else."""
+    """Compile the arm alone, at its base pose."""
     spec = mujoco.MjSpec.from_string(arm.model) if arm.model is not None else load_model(arm.mjcf, "arm")
     stand = pose.unpack(np.array([*arm.base, *arm.turn]))
     for body in spec.worldbody.bodies:

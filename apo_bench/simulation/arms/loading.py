@@ -1,4 +1,4 @@
-"""Read the model file of an arm or gripper, MJCF or URDF, as `MjSpec`, without what a scene has itself."""
+"""Read the model file of an arm or gripper, MJCF or URDF, without elements that the scene provides."""
 
 from pathlib import Path
 from typing import Any
@@ -9,10 +9,10 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 
-_LONGEST = 200
+_LONGEST = 200  # characters of MuJoCo's reason in an error message
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
 _OF_THE_SCENE = ("sensors", "keys", "cameras", "lights", "textures", "pairs", "skins", "texts", "numerics", "tuples")
-"""A scene has these itself, or needs none of them."""
+"""Elements that the scene provides or does not need."""
 
 
 def load_model(path: Path, kind: str) -> Any:
@@ -54,7 +54,7 @@ def load_model(path: Path, kind: str) -> Any:
 
 
 def compile_model(spec: Any, path: Path) -> Any:
-    """The model of what was read.
+    """Compile a model that was read.
 
     Raises:
         InputError: MuJoCo cannot compile it, or a pose or a range in it is not finite.
@@ -72,9 +72,9 @@ def compile_model(spec: Any, path: Path) -> Any:
 
 
 def _read(path: Path) -> Any:
-    """A model file as it is, or without what the grippers of robosuite have and MuJoCo refuses.
+    """Read a model file; faults of robosuite's grippers that MuJoCo refuses are removed.
 
-    These state some meshes twice, of which robosuite takes the first, and a group of a class, which has no effect.
+    They are repeated meshes, of which robosuite uses the first, and the group of a default class, which has no effect.
     """
     try:
         return mujoco.MjSpec.from_file(str(path))
@@ -97,12 +97,13 @@ def _read(path: Path) -> Any:
 
 
 def _mesh_file(spec: Any, mesh: Any) -> Path:
+    """The absolute path of a mesh file."""
     stated = Path(mesh.file)
     return (Path(spec.modelfiledir) / spec.meshdir / stated).absolute()
 
 
 def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
-    """Keep the meshes that something touches by, each with its absolute path."""
+    """Keep only meshes of colliding geoms, each with an absolute path."""
     used = {geom.meshname for geom in spec.geoms if geom.meshname}
     for mesh in list(spec.meshes):
         if mesh.name not in used:
@@ -118,5 +119,5 @@ def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """What MuJoCo says, in one line."""
+    """The message of MuJoCo in one line."""
     return one_line(" ".join(str(error).split()).rstrip("."), _LONGEST)

@@ -1,8 +1,8 @@
-"""Joint position control for arms that have none, or whose own is too soft.
+"""Joint position servos for arms without position actuators, or with soft ones.
 
-Of every joint one position actuator: as stiff as the inertia at the joint at home allows at one natural
-frequency, damped critically, limited by the torque of the joint. Gravity is compensated; the velocity of the path is
-fed forward by the robot (`feedforward_command`).
+Each joint gets one position actuator. Its stiffness follows from the inertia at the joint at home and a natural
+frequency. It is critically damped and limited by the torque of the joint. Gravity is compensated; the robot feeds the
+velocity of the path forward (`feedforward_command`).
 """
 
 import math
@@ -14,23 +14,23 @@ import numpy as np
 
 from apo_bench.geometry import Array
 
-_SOFT_HZ = 15.0  # a position actuator whose joint would swing slower is too soft
-_MOST_HZ = 45.0  # none is made that swings faster
+_SOFT_HZ = 15.0  # least natural frequency of a joint with its actuator
+_MOST_HZ = 45.0  # largest natural frequency of a servo
 _STIFF_NM = 5000.0
-"""As stiff as this, [Nm/rad], where the second frequency allows it."""
+"""Wanted stiffness of a servo, [Nm/rad], within the stiffnesses of both frequencies."""
 
 
 class Drive(NamedTuple):
-    """What moves a joint in the model as it was given."""
+    """The drive of a joint in the model as it was read."""
 
     stiffness: float
-    """[Nm/rad] of a position actuator, else 0."""
+    """Stiffness of the position actuator, [Nm/rad]; 0 without one."""
     torque: float
-    """The most it can do, [Nm]; infinite if not stated."""
+    """Largest torque, [Nm]; infinite if not stated."""
 
 
 def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
-    """What the actuators of a model do at its joints."""
+    """Joint -> stiffness and torque limit of its actuators in a model."""
     drives = {}
     for name in joints:
         j = model.joint(name).id
@@ -41,9 +41,11 @@ def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
             if kind != int(mujoco.mjtTrn.mjTRN_JOINT) or int(model.actuator_trnid[a, 0]) != j:
                 continue
             gear = abs(float(model.actuator_gear[a, 0]))
+            # biasprm[1] is -kp of a position actuator
             stiffness = max(stiffness, -float(model.actuator_biasprm[a, 1]) * gear * gear)
             if model.actuator_forcelimited[a]:
                 limit = min(limit, gear * float(np.abs(model.actuator_forcerange[a]).max()))
+            # A torque motor: its torque limit follows from the range of its command.
             elif not stiffness and not model.actuator_biasprm[a].any() and model.actuator_ctrllimited[a]:
                 most = float(np.abs(model.actuator_ctrlrange[a]).max())
                 limit = min(limit, gear * abs(float(model.actuator_gainprm[a, 0])) * most)
@@ -54,7 +56,7 @@ def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
 
 
 def joint_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
-    """(joints,), the inertia at each joint alone, [kg m^2]."""
+    """The inertia at each joint with all others fixed, (joints,), [kg m^2], at joint angles q."""
     data = mujoco.MjData(model)
     at = [model.joint(name).id for name in joints]
     data.qpos[model.jnt_qposadr[at]] = q
@@ -65,18 +67,18 @@ def joint_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
 
 
 def stiffness_for(inertia: float) -> float:
-    """The stiffness for an inertia at the joint, [Nm/rad]."""
+    """The stiffness of a servo for an inertia at its joint, [Nm/rad]."""
     usual, most = ((2.0 * math.pi * hz) ** 2 * inertia for hz in (_SOFT_HZ, _MOST_HZ))
     return min(max(usual, _STIFF_NM), most)
 
 
 def is_soft(stiffness: float, inertia: float) -> bool:
-    """Whether a joint swings slower than it has to."""
+    """Whether the natural frequency of a joint is below `_SOFT_HZ`, with 1 % tolerance of the stiffness."""
     return stiffness < (2.0 * math.pi * _SOFT_HZ) ** 2 * inertia * 0.99
 
 
 def add_servos(spec: Any, joints: Sequence[str], inertia: Array, drives: Mapping[str, Drive]) -> None:
-    """One position actuator for each joint, of the same name."""
+    """Add a position servo of the same name for each joint."""
     for name, J in zip(joints, inertia, strict=True):
         kp = stiffness_for(float(J))
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)

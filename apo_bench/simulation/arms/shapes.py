@@ -1,4 +1,4 @@
-"""Look up the bodies of a hand and how far its shapes reach, in a compiled model."""
+"""Descendants of a body, and extents of geoms, in a compiled model."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from apo_bench.geometry import Array
 
 
 def below(model: Any, body: int) -> set[int]:
-    """A body and what hangs on it."""
+    """A body and all its descendants."""
     hanging = {body}
     for b in range(body + 1, model.nbody):
         if int(model.body_parentid[b]) in hanging:
@@ -17,7 +17,7 @@ def below(model: Any, body: int) -> set[int]:
 
 
 def geom_reach(model: Any, data: Any, geom: int, ahead: Array) -> float:
-    """How far the box around a geom reaches along a direction, world, [m]."""
+    """The largest coordinate of a geom's bounding box along a world direction, [m]."""
     along = data.geom_xmat[geom].reshape(3, 3).T @ ahead
     centre = model.geom_aabb[geom, :3]
     half = model.geom_aabb[geom, 3:]

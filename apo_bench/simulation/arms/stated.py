@@ -1,4 +1,4 @@
-"""Make the arm of a description that states its gripper: the model is used as it is."""
+"""Make the arm of a description that states a gripper of slides; its model is used as it is."""
 
 from pathlib import Path
 from typing import Any
@@ -22,21 +22,21 @@ def model_files(description: ArmDescription) -> tuple[Path, ...]:
 
 
 def speed_limits(description: ArmDescription, joints: int) -> Array | None:
-    """The fastest that each joint may turn, (joints,), [rad/s]; None where nothing is stated."""
+    """The largest speed of each joint, (joints,), [rad/s]; None if not stated."""
     speeds = description.of_each_joint("speed_deg_s", joints)
     return None if speeds is None else np.radians(speeds)
 
 
 def stated_arm(description: ArmDescription, model: Any, joints: list[str], flange: str) -> Arm:
-    """The arm of a file whose gripper is stated.
+    """The arm of a file that states a gripper of slides.
 
     Args:
-        model: As its MJCF file says it, compiled.
+        model: The compiled model of the arm.
         joints: The hinges between base and flange.
-        flange: The body at the end of the arm.
+        flange: The last body of the arm.
 
     Raises:
-        InputError: Its model lacks what the file names, or a key is missing.
+        InputError: The model lacks what the file names, or a key is missing.
     """
     file = description.file
     gripper = description.gripper

@@ -1,4 +1,4 @@
-"""The robot executes a plan."""
+"""The robot executes a plan: prepared transfers, carried out by guarded motions, with search, probing and a cache."""
 
 from apo_bench.simulation.execution.carry_out import carry_to_attach, choose_pace, find_attach_end, finish_attach
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig

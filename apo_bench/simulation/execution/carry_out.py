@@ -1,7 +1,7 @@
 """Carry out one operation: `pick` (pick, lift), then `place` (carry, attach, release, depart).
 
 Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers. The macros of
-the plan are carried out in force: guarded where contacts close, by position along those that stay closed.
+the plan become guarded motions where contacts close, and position-controlled ones along contacts that stay closed.
 """
 
 import math
@@ -28,41 +28,41 @@ from apo_bench.simulation.robot import (
 )
 from apo_bench.simulation.robot.paths import distance
 
-_LIFT = (0.4, 0.25)  # peak speeds [m/s] with a part, and with one that carries others
+_LIFT = (0.4, 0.25)  # peak speeds of lifting [m/s]: of a single part, and of one that carries others
 _CARRY = (0.5, 0.35)  # as `_LIFT`, through the air
 _LOWER = (0.35, 0.2)  # as `_LIFT`, down; the faster, the more a part drifts in the hand
 _LOST_LOAD = 0.8
-"""A hand that weighs less than this part of the weight of a group has lost some of it."""
-_PLACE = 0.06  # [m/s] down to just above the support
-_TOUCH = 0.01  # [m/s] onto the support
-_INSERT = 0.06  # [m/s] along an insertion
-_SLIDE = 0.005  # [m/s] against a part at the side
-_PULL = 0.1  # peak speed [m/s] of a part that is pulled out
-_LEAVE = 0.03  # peak speed [m/s] of a part that is moved off a side
+"""Measured load, as a fraction of the weight of a carried group, below which a part of the group is lost."""
+_PLACE = 0.06  # speed [m/s] down to just above the support
+_TOUCH = 0.01  # speed [m/s] where contact is expected
+_INSERT = 0.06  # speed [m/s] near the entrance of a hole
+_SLIDE = 0.005  # speed [m/s] of a slide towards a part at the side
+_PULL = 0.1  # peak speed [m/s] at which a part is pulled out
+_LEAVE = 0.03  # peak speed [m/s] at which a part is moved off a side
 _OVERTRAVEL_M = 0.002
-"""Contact is sought this far beyond the goal."""
+"""Distance beyond the goal up to which a motion seeks contact."""
 _BOTTOM_M = 0.003
-"""The robot approaches a bottom slowly from this far before it."""
+"""Distance before a bottom from which the robot approaches slowly."""
 _ARRIVED_M = 0.001
-"""An insertion that stops earlier than this before its end was stopped by force."""
+"""An insertion that ends farther than this before its goal was stopped by force."""
 _THROUGH = 0.15
-"""Steady speed [m/s] where only walls are that the part is between already."""
-_BEFORE_M = 0.008  # the entrance of a hole may be nearer by this
-_BEHIND_M = 0.004  # and farther by this
-_BEYOND_M = 0.004  # a slide may go beyond the goal by this
-_OFF_M = 0.0003  # and over the floor by this
+"""Steady speed [m/s] between walls, away from entrances and bottoms."""
+_BEFORE_M = 0.008  # the motion is slow from this far before an expected entrance
+_BEHIND_M = 0.004  # and up to this far behind it
+_BEYOND_M = 0.004  # greatest travel of a slide beyond the expected contact
+_OFF_M = 0.0003  # height above the floor at which a part is slid
 _LOOSE_M = 0.00005
-"""Faces this far apart touch for the judge, and do not rub."""
+"""Gap that stops friction between two faces, yet counts as contact for the judge."""
 
 
 def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
-    """Pick the part and lift it.
+    """Pick the part and lift it to the carrying height.
 
     Returns:
-        Which of its grips is then in use.
+        Index into `t.grips` of the grip that is then in use.
 
     Args:
-        again: Whether it is squared and grasped twice.
+        again: Whether the fingers open and close once more after the grasp, to square the part.
 
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
@@ -76,10 +76,10 @@ def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
         grasp_again(robot, t.grips[0])
     in_use = _pull_out(robot, t) if t.out.level else 0
     robot.stage = "lift"
-    if t.carried:
+    if t.carried:  # slowly at first, so that carried parts do not shift
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, 0.004), 0.02))
     _leave(robot, t)
-    robot.steady(not t.drawn)
+    robot.steady(not t.drawn)  # a part that is drawn out of walls touches them at first
     robot.follow(
         smooth_trajectory(robot.T, move_to_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)])
     )
@@ -88,10 +88,11 @@ def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
 
 
 def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
-    """Carry the part that is held by its i-th grip, attach it, let go and depart.
+    """Carry the part, attach it, release it and depart.
 
     Args:
-        lay: Lays it flat first, before a level insertion below where that begins, and returns its grip then.
+        i: Index into `t.grips` of the grip in use.
+        lay: As for `carry_to_attach`.
 
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
@@ -105,10 +106,15 @@ def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
 def carry_to_attach(
     robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None
 ) -> tuple[Grip, Grip | None]:
-    """Carry the part to where the guarded motion begins; returns the grip, and the next if it is to be changed.
+    """Carry the part to where the guarded motion begins.
 
     Args:
-        lay: As in `bring`.
+        i: Index into `t.grips` of the grip in use.
+        lay: Lays the part flat on a fixed face and returns its updated grip; None: this is skipped. Before a level
+            insertion this happens after the carrying, else before it.
+
+    Returns:
+        The grip, and the next one if the grip changes during the insertion, else None.
 
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
@@ -127,16 +133,19 @@ def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_
     """Do the rest of an operation after an agent has moved the part to `find_attach_end`.
 
     Args:
-        T_found: What brings the poses that were meant to those that were found, (4, 4), world.
+        grip: The grip in use.
+        second: The next grip, if the grip changes during the insertion.
+        T_found: Transform from planned poses to those that the agent found, (4, 4), world.
 
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
     """
-    left = 0.0
-    rise = t.floats
+    left = 0.0  # of the insertion, [m]
+    rise = t.floats  # height of the part above its slot's floor, [m]
     if second is not None:
         grip, rise = _with_other_grip(robot, t, grip, second, T_found)
         left = _to_goal(robot, t, grip, rise, T_found)
+    # After a level insertion down onto the floor of the slot, else on in the direction of the insertion.
     lower = rise if t.into.level else 0.0
     guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.direction, t.place_n)
     robot.follow(
@@ -148,7 +157,7 @@ def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_
 
 
 def find_attach_end(t: Transfer, grip: Grip, second: Grip | None) -> Array:
-    """The tip pose at which the guarded motion ends, or the first of two with a change of the grip between, (4, 4)."""
+    """Return the tip pose at which the guarded motion ends, (4, 4); if the grip changes, the motion up to there."""
     goal = first_contact_pose(t)
     if second is not None and t.into.left is not None:
         goal = translate(t.T_world_goal, t.into.direction, -t.into.left)
@@ -156,18 +165,22 @@ def find_attach_end(t: Transfer, grip: Grip, second: Grip | None) -> Array:
 
 
 class Pace(NamedTuple):
-    """How fast a guarded motion goes in, by how far it is from the goal."""
+    """Speed limits of a guarded motion as a function of the distance to the goal."""
 
     quick: float
-    """[m/s], apart from the stretches."""
+    """Speed outside of the stretches, [m/s]."""
     stretches: tuple[tuple[float, float, float], ...]
-    """From and to so far before the goal, [m], at most so fast, [m/s]."""
+    """Slow stretches: begin and end as distances before the goal, [m], and greatest speed, [m/s]."""
     end: float
-    """It ends so far before the goal, [m]; beyond it where contact is sought."""
+    """Distance before the goal at which the motion ends, [m]; negative where it seeks contact beyond the goal."""
 
 
 def choose_pace(t: Transfer, second: Grip | None) -> Pace:
-    """The pace of the motion to `find_attach_end`: slow where an entrance or contact may be."""
+    """Return the speed limits of the motion to `find_attach_end`: slow near entrances and where contact may come.
+
+    Args:
+        second: The next grip, if the grip changes during the insertion.
+    """
     bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
     if not t.into.level:
         return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
@@ -180,7 +193,11 @@ def choose_pace(t: Transfer, second: Grip | None) -> Pace:
 
 
 def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
-    """Let go and depart; `left` [m] is what is left of an insertion."""
+    """Release the part and depart; abort if the insertion was stopped more than `_ARRIVED_M` before its end.
+
+    Args:
+        left: What is left of the insertion, [m].
+    """
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:
@@ -191,7 +208,10 @@ def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
-    """Over everything that stands, down to where the last motion begins; there the arm stands and weighs its load."""
+    """Carry the part over all others and down to where the last motion begins, and check there that it is still held.
+
+    The load is weighed if the part carries others.
+    """
     robot.stage = "carry"
     before = translate(first_contact_pose(t) @ grip.T_part_tip, t.into.direction, -t.begins)
     if t.into.level:
@@ -208,9 +228,10 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 
 def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
-    """Carry out the macros one after the other; returns what is left of an insertion that force stopped, and the grip.
+    """Carry out the macros: those along `t.into` as one motion, then the slides.
 
-    Those that lead along the line of attach are one motion, which ends where the last of them does.
+    Returns:
+        What is left of an insertion that force stopped, [m], and the grip in use.
     """
     left = 0.0
     if t.into.level:
@@ -222,19 +243,23 @@ def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
 
 
 def _slides(robot: Robot, t: Transfer, left: float) -> None:
-    """Against each of its sides, if an insertion came as far as that."""
+    """Slide the part against each of its sides, unless the insertion was stopped early with `left` [m] to go."""
     for i, side in enumerate(t.sides if left <= _ARRIVED_M else ()):
         _slide(robot, t, side, t.sides[:i])
 
 
 def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
-    """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
+    """Insert the part along the guarded level line, changing the grip on the way if planned, and put it down.
+
+    Returns:
+        What is left of the line, [m], and the grip in use.
+    """
     rise = t.floats
     T_search = None
     if t.into.left is not None and second is not None:
         line = _into(robot, t, find_attach_end(t, grip, second), t.into.left)
         left, T_search = press_in(robot, t, grip, line, Guard(t.into.direction, t.insert_n), _ARRIVED_M)
-        if left > _ARRIVED_M:
+        if left > _ARRIVED_M:  # stopped by force before the change of grip
             return left + t.into.left, grip
         grip, rise = _with_other_grip(robot, t, grip, second, T_search)
     left = _to_goal(robot, t, grip, rise, T_search)
@@ -245,7 +270,14 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
 
 
 def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_search: Array | None) -> tuple[Grip, float]:
-    """Take the part at its second place, and lift it off the floor; returns that grip, and how far up the part is."""
+    """Change to the second grip and lift the part off the floor of its slot.
+
+    Args:
+        T_search: From `press_in`: planned poses -> found ones, (4, 4), world; None without a search.
+
+    Returns:
+        The second grip, and the height of the part above the floor, [m].
+    """
     there = translate(translate(t.T_world_goal, t.into.direction, -(t.into.left or 0.0)), UP, t.floats)
     change_grip(robot, t, grip, second, after_search(T_search, translate(there, UP, -t.floats) @ second.T_part_tip))
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.clearance), 0.01))
@@ -253,7 +285,15 @@ def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_sear
 
 
 def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array | None) -> float:
-    """The guarded level line to the goal, and against a bottom; returns what is left of it, [m]."""
+    """Move the part along the guarded level line to the goal, and against a bottom if the plan has one.
+
+    Args:
+        rise: Height of the part above the floor of its slot, [m].
+        T_search: From `press_in`: planned poses -> found ones, (4, 4), world; None without a search.
+
+    Returns:
+        What is left of the line, [m].
+    """
     guard = Guard(t.into.direction, t.insert_n)
     goal = after_search(T_search, translate(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if not any(macro.name == "move-to-bottom" for macro in t.macros):
@@ -267,7 +307,7 @@ def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array
 
 
 def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
-    """From above, slowly where contact may come any moment, until the part stands."""
+    """Lower the part from above until it stands, slowly where contact may come."""
     down = Guard(t.into.direction, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
     above = plan_steady_trajectory(robot.T, translate(goal, t.into.direction, -t.slow), _PLACE)
@@ -279,17 +319,24 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 
 def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
-    """On to `left` [m] before the goal, slowly where an entrance may be."""
+    """Return the trajectory to a tip pose, slow near the entrances.
+
+    Args:
+        end: The tip pose, (4, 4).
+        left: Distance of the part from its goal when the tip is there, [m].
+    """
+    # Distances of the entrances from here.
     at = [distance(robot.T, end) + left - entrance for entrance in t.entrances]
     return plan_paced_trajectory(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 
 def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
-    """Off the floor by a hair, sideways until it touches, and down again.
+    """Raise the part off the floor by `_OFF_M`, slide it sideways until it touches, and put it down again.
 
     Args:
-        touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction
-            would pass for the next.
+        side: Direction of the slide, (3,), world.
+        touched: Directions of earlier slides. The part first moves off these sides by `_LOOSE_M`, since the guard
+            would take friction on them for the contact.
     """
     robot.macro = "slide-to-contact"
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
@@ -306,7 +353,11 @@ def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -
 
 
 def _pull_out(robot: Robot, t: Transfer) -> int:
-    """Backwards along the way of an insertion; returns which of the grips is in use at its end."""
+    """Pull the part out backwards along `t.out`, changing the grip on the way if planned.
+
+    Returns:
+        Index into `t.grips` of the grip in use at the end.
+    """
     robot.stage = "lift"
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.floats), 0.01))
     if t.out.left is None:
@@ -321,7 +372,7 @@ def _pull_out(robot: Robot, t: Transfer) -> int:
 
 
 def _leave(robot: Robot, t: Transfer) -> None:
-    """Off what the part touches at its side, before it is lifted."""
+    """Move the part off everything that it touches at its side, before it is lifted."""
     if t.away:
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
     for side in t.away:

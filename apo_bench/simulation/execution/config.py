@@ -1,4 +1,4 @@
-"""The settings of one execution of a plan."""
+"""The settings of one execution of a plan: fidelity, search, time limit, robot errors, probing."""
 
 import math
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
-"""The robot replays a plan, open loop in the poses and closed loop in force.
+"""Replay a plan with the robot: open loop in the poses, closed loop in force.
 
-Every method has the same controller.
+All correction methods are evaluated with this controller.
 """
 
 import math
@@ -20,9 +20,9 @@ from apo_bench.simulation.robot import ExecutionAborted, Robot
 from apo_bench.simulation.scene import Scene, allow_sleep, take_snapshot
 
 _SETTLE_S = 0.5
-"""At the end, everything is left alone this long."""
+"""Time that the robot stands still after the last operation."""
 _SHORTEST_STEP_S = 1.0
-"""Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
+"""Lower bound of the duration of a step; the fastest replay of the benchmark takes four seconds a step."""
 
 
 @check_arguments
@@ -48,12 +48,13 @@ def replay(
         The state that the robot reached, and how the replay ended; `judge` takes `reached`.
     """
     start = plan.start if parts_at is None else parts_at
-    if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:
+    if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:  # cannot end in time: not even planned
         todo: tuple[Move, ...] = ()
         refused: Outcome | None = failed_outcome(plan, "plan", "time_limit", plan.schedule[0].operation)
     else:
         todo = moves_with_error(plan, scene, config, config.robot_error)
         refused = _refusal(plan, scene, todo)
+    # Hooks must see every step, and probing depends on more than the keys contain: such replays share no states.
     cache = ReplayCache() if cache is None or watch is not None or config.probing is not None else cache
     keys = cache_keys(scene, start, config.fidelity, todo, config.robot_error)
     same = None if refused or not keys or config.time_limit_s < math.inf else cache.ended(keys[-1])
@@ -81,7 +82,8 @@ def replay(
 
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
-    """What is wrong with the plan before anything moves."""
+    """Return the outcome of a plan that fails before anything moves: unstable or out of reach; None if it is fine."""
+    # Before each undo and at the end, the parts placed so far must stand stably at their targets.
     for upto, goals in list_poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
@@ -93,11 +95,12 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
 
 
 def _settle(robot: Robot, plan: Plan) -> Snapshot | None:
+    """Wait until all parts rest; return their final poses, None if the simulation became unstable."""
     try:
         with robot.watch_stability():
             robot.wait(_SETTLE_S)
             wait_for_rest(robot)
     except ExecutionAborted as aborted:
         if aborted.code == "unstable_simulation":
-            return None
+            return None  # after any other failure the poses still count
     return take_snapshot(robot.scene.work, robot.data, plan.start)

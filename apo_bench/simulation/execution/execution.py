@@ -1,4 +1,4 @@
-"""Execute a schedule of moves by one robot."""
+"""Execute the moves of a plan one after the other, with probing, slip records and the cache of states."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,11 +18,15 @@ from apo_bench.simulation.robot import ExecutionAborted, GraspSlipMonitor, Robot
 from apo_bench.simulation.scene import Scene, take_snapshot
 
 _AT_FIRST_S = 0.05
-"""The arm stands so long before the first operation."""
+"""Time that the arm stands still before the first operation."""
 
 
 def moves_with_error(plan: Plan, scene: Scene, config: ExecutionConfig, error: RobotError | None) -> tuple[Move, ...]:
-    """The moves of a plan as a robot with an error executes them."""
+    """Return the moves of a plan with the poses to which a robot with errors really goes.
+
+    Args:
+        error: Hand-eye and tool error enter here; joint errors are part of the simulated robot. None: no error.
+    """
     if error is None:
         return plan_moves(plan, scene, config.searches, config.actions)
     planned = plan_moves(error.plan(plan), scene, config.searches, config.actions)
@@ -30,12 +34,19 @@ def moves_with_error(plan: Plan, scene: Scene, config: ExecutionConfig, error: R
 
 
 def failed_outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
-    """The outcome of an operation that failed; by default about its main part."""
+    """Return the outcome of a failed operation.
+
+    Args:
+        stage: Where it failed, such as `pick` or `plan`.
+        code: The failure code.
+        k: The operation, counted from 0.
+        part: The part that the description names; by default the main part of the operation.
+    """
     return Outcome(stage, code, k, describe_outcome(code, part=part or plan.assembly.operations[k].main, operation=k))
 
 
 class Execution:
-    """One robot on its way through a schedule."""
+    """One robot that executes one plan, with its progress and its calibration by probing."""
 
     def __init__(self, plan: Plan, robot: Robot, config: ExecutionConfig) -> None:
         self.plan = plan
@@ -48,21 +59,26 @@ class Execution:
 
     @property
     def residual(self) -> RobotError | None:
-        """The errors of the robot for which its commands do not compensate."""
+        """The errors of the robot that remain after its commands compensate for the estimated ones; None: no errors."""
         return self.config.robot_error if self.probing is None else self.probing.residual
 
     def moves(self) -> tuple[Move, ...]:
-        """The moves of the plan by the present estimate of the robot's errors."""
+        """Return the moves of the plan with the errors that remain by the present calibration estimate."""
         return moves_with_error(self.plan, self.robot.scene, self.config, self.residual)
 
     def run(self, todo: tuple[Move, ...], cache: ReplayCache, keys: Sequence[bytes]) -> Outcome:
-        """Execute moves one after the other, from the furthest state in the cache.
+        """Execute moves one after the other, starting from the furthest state in the cache.
 
         Args:
-            todo: The first moves of the schedule; planned again once the robot has probed.
-            keys: Those of `todo`, two for each move.
+            todo: The first moves of the schedule; planned again after probing.
+            cache: Saved states of earlier replays, to which this one adds.
+            keys: Cache keys of `todo`, two for each move: after it is picked, and after it is done.
+
+        Returns:
+            The outcome of the first failure, or success.
         """
         robot = self.robot
+        # Two states are kept for each move, so `kept_states // 2` moves are done already.
         kept_states, grip = cache.resume(keys, robot, self.progress)
         if not kept_states:
             try:
@@ -80,7 +96,7 @@ class Execution:
             robot.hooks.before_step(step)
             try:
                 with robot.watch_stability():
-                    if kept_states <= 2 * i:
+                    if kept_states <= 2 * i:  # else the restored state already holds this part
                         grip = self.pick(transfer, step.operation)
                         cache.keep(keys[2 * i], robot, grip, self.progress)
                     place(robot, transfer, grip, self.laying(transfer, step.operation))
@@ -90,7 +106,7 @@ class Execution:
             except ExecutionAborted as aborted:
                 if aborted.code != "unstable_simulation":
                     self._note_slip(step)
-                if aborted.code == "force_stop" and not step.undo:
+                if aborted.code == "force_stop" and not step.undo:  # the part is placed, but not at its goal
                     self.progress.after[step.operation] = take_snapshot(robot.scene.work, robot.data, self.plan.start)
                 return failed_outcome(self.plan, aborted.stage, aborted.code, step.operation, aborted.part)
             self.progress.after[step.operation] = reached
@@ -100,7 +116,10 @@ class Execution:
         return Outcome("done", "ok", None, describe_outcome("ok"))
 
     def pick(self, transfer: Transfer, operation: int) -> int:
-        """Pick a part, which may slip; returns which of the grips of the transfer is in use.
+        """Pick the part of an operation and apply the slip that was drawn for it.
+
+        Returns:
+            Index into `transfer.grips` of the grip in use.
 
         Raises:
             ExecutionAborted: Something went wrong.
@@ -110,14 +129,17 @@ class Execution:
         return grip
 
     def laying(self, transfer: Transfer, operation: int) -> Callable[[Transfer, Grip], Grip] | None:
-        """How to lay the part flat that was picked, before it is inserted; None where that does not happen."""
+        """Return the function that lays the picked part flat before it is inserted; None if this is not planned.
+
+        With probing, the grasp is also added to the calibration estimate.
+        """
         if self.probing is None:
             return None
         self.probing.note_grasp(operation)
         return None if transfer.flat is None else partial(lay_flat, self.robot, self.probing, operation)
 
     def _begin(self, todo: tuple[Move, ...]) -> tuple[Move, ...]:
-        """Stand, and probe; returns the moves by what that showed."""
+        """Stand still, and probe if configured; return the moves, planned again by the updated calibration."""
         self.robot.wait(_AT_FIRST_S)
         if self.probing is None:
             return todo
@@ -125,9 +147,9 @@ class Execution:
         return self.moves()[: len(todo)]
 
     def _note_slip(self, step: Step) -> None:
-        """Record how the part moved in the hand; not of an operation that is undone."""
+        """Add the slip in the hand during a step to the records; steps that undo an operation have none."""
         monitor = self.robot.slip_monitor
-        if monitor.grasped is not None:
+        if monitor.grasped is not None:  # aborted with the part in the hand
             monitor = monitor.release(self.robot.in_hand())
         undone = GraspSlipMonitor(finished=monitor.finished)
         self.robot.slip_monitor = undone if step.undo else monitor.finish(step.operation)

@@ -1,4 +1,4 @@
-"""The fingers: take a part, let go of it, take it elsewhere, centre it."""
+"""Finger actions: grasp a part, release it, change the grip, centre it, check that it is held."""
 
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, find_hover_pose, is_tilted
@@ -15,25 +15,29 @@ from apo_bench.simulation.robot import (
 
 _FREE = 2.0  # peak speed [m/s] of the empty hand in the air
 _NEAR = 0.8  # as `_FREE`, close to parts
-_DEPART_M = 0.09  # the hand moves back by this after a release
-OPEN_TO_PICK_M = 0.012  # each finger stands off by this before it closes
-OPEN_TO_RELEASE_M = 0.008  # and by this after a release
+_DEPART_M = 0.09  # distance that the hand moves back after a release
+OPEN_TO_PICK_M = 0.012  # distance of each finger from the part before it closes
+OPEN_TO_RELEASE_M = 0.008  # distance of each finger from the part after a release
 _LOST_M = 0.002
-"""Fingers that close this far beyond the part's surface hold nothing; those of a linkage that gives way, a quarter of
-the way to the middle."""
+"""Fingers that close this far beyond the part's surface hold nothing. For the fingers of a described hand, whose
+linkage may give way, the limit is at least a quarter of the half width."""
 
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
-    """Come down to the part with open fingers, and close them."""
+    """Move to the part with open fingers, close them, and check that they hold it.
+
+    Args:
+        at: The tip pose at which the fingers close, (4, 4), world.
+    """
     above = find_hover_pose(at)
     least = max(above[2, 3], t.over)
     robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
     level = move_to_height(above, robot.T[2, 3])
-    # A short arm does not reach as far out as here where it waits, or has passed over other parts.
+    # A short arm cannot reach over the grasp at the present height; then it comes down to the least height on its way.
     between = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
     is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, between, robot.q) is None
     robot.go(move_to_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
-    robot.forces.handle(t.part)
+    robot.forces.handle(t.part)  # from here on contact with this part is no collision
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     if is_tilted(at):
         robot.follow(smooth_trajectory(robot.T, above, _NEAR))
@@ -43,12 +47,13 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     if robot.scene.grasp == "weld":
         weld(robot.scene, robot.data, t.part, True)
     else:
-        robot.fingers(grip.half_width - robot.arm.squeeze_m)
+        robot.fingers(grip.half_width - robot.arm.squeeze_m)  # inside the part, so that the fingers press
     robot.slip_monitor = robot.slip_monitor.grasp(robot.in_hand())
     check_hold(robot, grip)
 
 
 def release(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """Open the fingers and note that the hand is empty."""
     robot.stage = "release"
     robot.slip_monitor = robot.slip_monitor.release(robot.in_hand())
     if robot.scene.grasp == "weld":
@@ -58,6 +63,7 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 
 def depart(robot: Robot, t: Transfer) -> None:
+    """Move the empty hand back from a released part, then up to the carrying height."""
     robot.stage = "depart"
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.forces.handle(None)
@@ -65,7 +71,13 @@ def depart(robot: Robot, t: Transfer) -> None:
 
 
 def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
-    """Let go, and take the part at another place."""
+    """Release the part and grasp it at another place.
+
+    Args:
+        grip: The grip in use.
+        second: The next grip.
+        at: The tip pose of the next grip, (4, 4), world.
+    """
     stage = robot.stage
     robot.stand()
     release(robot, t, grip)
@@ -75,14 +87,18 @@ def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) 
 
 
 def centre(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
-    """Close the fingers on the part where it should stand, a pose (4, 4), and open them again."""
+    """Centre a standing part: close the fingers on it where it should stand, open them, and depart.
+
+    Args:
+        at: The pose at which the part should stand, (4, 4), world.
+    """
     grasp(robot, t, grip, at @ grip.T_part_tip)
     release(robot, t, grip)
     depart(robot, t)
 
 
 def grasp_again(robot: Robot, grip: Grip) -> None:
-    """Open and close where the tip is: what the first closing dragged and turned, the second takes squarely."""
+    """Open and close the fingers once more, to square a part that the first closing dragged and turned."""
     if robot.scene.grasp == "friction":
         robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
         robot.stand()
@@ -92,6 +108,7 @@ def grasp_again(robot: Robot, grip: Grip) -> None:
 
 
 def check_hold(robot: Robot, grip: Grip) -> None:
+    """Abort with `lost_grasp` if the fingers have closed beyond the surface of the part."""
     lost = _LOST_M if robot.arm.hand is None else max(_LOST_M, grip.half_width / 4)
     if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - lost:
         raise ExecutionAborted(robot.stage, "lost_grasp")

@@ -1,7 +1,7 @@
-"""Find where a held part can lie flat on what is fixed, before it is inserted.
+"""Find where a held part can be laid flat on a fixed face before its insertion, to measure its pose in the hand.
 
-On a plane its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper). A level
-insertion needs them, and pads that only centre across cannot give them.
+A part that lies on a plane has a known height and two known tilts (plane on plane, Eq. 1 of the paper). A level
+insertion needs these, and the pads determine only the position between them.
 """
 
 from typing import NamedTuple
@@ -27,38 +27,40 @@ from apo_bench.simulation.robot import translate
 from apo_bench.simulation.scene import Scene
 
 NOISE_LEVEL = float(np.cos(np.radians(10.0)))
-"""A face that looks up by less than ten degrees off is one to lie on."""
+"""Least upward component of the normal of a face on which a part can lie: at most 10 degrees of tilt."""
 _LOWEST_M = 1e-4
-"""Corners this near to the lowest one lie on the floor."""
+"""Corners within this height of the lowest one are feet."""
 _LIFT_M = 0.01
-"""What stood is lifted so far before it is laid down again."""
-_LIFT_ROOM_M = 0.002  # on the way down everything else stays this far away
-_LIFT_STEP_M = 0.003  # which is checked so often
+"""Height to which a part is lifted before it is laid down where it stood."""
+_LIFT_ROOM_M = 0.002  # distance to all other parts on the way down
+_LIFT_STEP_M = 0.003  # spacing of the places checked on the way down
 
 
 class FlatPlacement(NamedTuple):
-    """A part laid flat."""
+    """A part that lies flat on a fixed face, the floor."""
 
     T: Array
-    """Its pose, (4, 4), world."""
+    """Pose of the part, (4, 4), world."""
     normal: Array
-    """Of the floor, upwards, (3,), world."""
+    """Unit normal of the floor, upwards, (3,), world."""
     feet: Array
-    """Corners of the part on which it lies, (k, 3), in its own frame, [m]: at most four, far apart."""
+    """Corners on which the part lies, (k, 3), in the frame of the part, [m]: at most four, far apart."""
 
 
 def before_insertion(t: Transfer) -> Array:
-    """Where a part is when its last motion begins, (4, 4), world."""
+    """Return the pose of the part where its guarded motion begins, (4, 4), world."""
     before = translate(first_contact_pose(t), t.into.direction, -t.begins)
     return translate(before, UP, t.floats) if t.into.level else before
 
 
 def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated: Poses) -> FlatPlacement | None:
-    """The part flat on a fixed face straight below where a level insertion begins; before one from above, where it
-    stood. None where it cannot.
+    """Return the part laid flat on the highest fixed face below it, or None if no face or no room is there.
+
+    Before a level insertion, this is below the place where the insertion begins; before one from above, it is where the
+    part stood.
 
     Args:
-        estimated: Where all parts are before the transfer.
+        estimated: Estimated poses of all parts before the transfer.
     """
     T = before_insertion(t) if t.into.level else translate(t.T_world_start, UP, _LIFT_M)
     up = upwards(T)
@@ -75,6 +77,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
     highest = max(lying, key=lambda each: float(each.T[2, 3]))
     flush = highest.T
     far = float(T[2, 3] - flush[2, 3])
+    # Displacements of the part on its way straight down, (k, 3), the last one zero.
     lifts = np.linspace(far, 0.0, max(2, round(far / _LIFT_STEP_M)))[:, None] * UP
     others = list_obstacles(assembly.solids, estimated, (t.part, *assembly.fixed))
     fixed = list_obstacles(assembly.solids, estimated, (t.part, *(set(assembly.solids) - assembly.fixed)))
@@ -86,7 +89,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
             > -_LIFT_ROOM_M
         ):
             return None
-    for each in fixed:  # down to the floor itself, which it touches
+    for each in fixed:  # without margin, since the part touches the floor
         if (
             measure_intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max()
             > 0.0
@@ -100,14 +103,22 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
 
 
 def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> FlatPlacement | None:
-    """The part above a face put down flat on it, if all that lies on it is inside of its outline."""
+    """Return the part turned flat and lowered onto a face, or None if a foot is outside of its outline.
+
+    Args:
+        T: Pose of the part above the face, (4, 4), world.
+        up: Direction in the frame of the part, (3,), that becomes the normal of the face.
+        floor: The face, of a fixed part at `T_floor`.
+    """
     n = T_floor[:3, :3] @ floor.normal
+    # Turn the part by the smallest angle that brings `up` onto the normal.
     axis = np.cross(T[:3, :3] @ up, n)
     sine = float(np.linalg.norm(axis))
     flat = np.array(T)
     if sine > 0.0:
         flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
     origin = T_floor @ make_plane_frame(floor)
+    # Then lower it vertically until its lowest point is in the plane of the floor.
     height = float(n @ (flat[:3, 3] - origin[:3, 3])) + measure_extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
     flat[:3, 3] -= height / float(n @ UP) * UP
     corners = collect_corners(scene.pieces[part])[0]
@@ -120,9 +131,13 @@ def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Arra
 
 
 def _far_apart(points: Array) -> list[int]:
-    """Which of points in a plane, (k, 2), are the ends of the longest way and the ends across it; each once."""
+    """Return the indices of up to four far points in a plane, (k, 2): both ends of the shape, along and across.
+
+    The first is farthest from the mean, the second is at the opposite end, and the others are the ends across.
+    """
     ahead = points - points.mean(axis=0)
     first = int(np.argmax((ahead * ahead).sum(axis=1)))
+    # Coordinates, up to a factor, along the direction to the first point and perpendicular to it.
     along = ahead @ ahead[first]
     across = ahead @ np.array([-ahead[first][1], ahead[first][0]])
     ends = (first, int(np.argmin(along)), int(np.argmin(across)), int(np.argmax(across)))

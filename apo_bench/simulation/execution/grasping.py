@@ -1,4 +1,4 @@
-"""Choose from the planned poses where to hold a part, so that the gripper strikes nothing."""
+"""Choose the grasp of a part from planned poses, so that the gripper collides with nothing."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -28,43 +28,46 @@ from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, make_obstac
 from apo_bench.simulation.scene import Scene
 
 _STAND_OFF_M = 0.012
-"""How far each finger stands off the part before it closes or after it has let go."""
+"""Distance of each finger from the part before it closes or after it has opened."""
 _MARGINS_M = (0.004, 0.003, 0.002)
-"""Room around the gripper, as much as there is."""
+"""Room required around the gripper; the first value for which there is a grasp is used."""
 _GRID_M = 0.003
-"""Candidates along a part, and looks along a stroke, are this far apart."""
+"""Spacing of candidate grasps along a part, and of the places checked along a stroke."""
 _SOME = (0, 1, 9, 73, None)
-"""So many places are checked in one call."""
+"""Bounds of the batches in which candidates are checked: the first alone, since it is often clear."""
 _END_M = 0.018
-"""No grasp is nearer to the end of a long part: the pads still lie on it."""
+"""Least distance of a grasp from the end of a long part, so that the whole pads lie on it."""
 _MOST_LEFT_M = 0.1
-"""A grip is changed so near to the goal that the part already lies in what it was put into."""
+"""Greatest distance to the goal at a change of grip, so that the part already lies in its hole or slot."""
 _HEIGHT = 0.65
-"""Height of the tip over the part's lowest point, as a part of its height."""
-_SQUARE = 1e-12
+"""Height of the grasp over the part's lowest point, as a fraction of the part's height."""
+_SQUARE = 1e-12  # cosine above which two directions are not taken as perpendicular
 _UPRIGHT = float(np.cos(np.radians(10.0)))
-"""Parts that were seen tilted stand as they stood, up to 10 degrees."""
+"""A part whose axis is observed within 10 degrees of the vertical is taken as upright."""
 
 
 class RestingPart(NamedTuple):
-    """The part at rest, and what stands around it."""
+    """The part at rest, and the parts around it."""
 
     T: Array
+    """Pose of the part, (4, 4), world."""
     around: tuple[Obstacle, ...]
 
 
 class Stroke(NamedTuple):
-    """A straight way of the part to `T`."""
+    """A straight motion of the part that ends at `T`."""
 
     T: Array
+    """Pose of the part, (4, 4), world."""
     direction: Array
     """Unit vector, (3,), world."""
     travel: float
+    """Length of the motion, [m]."""
     around: tuple[Obstacle, ...]
 
 
 class Grips(NamedTuple):
-    """One grasp for a whole stroke, or two with a change of grip `left` before its end."""
+    """One grasp for a whole stroke, or two with a change of grip `left`, [m], before its end."""
 
     first: Grasp
     left: float | None = None
@@ -72,12 +75,15 @@ class Grips(NamedTuple):
 
 
 def list_obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
-    """Every part but these, where it is estimated to be."""
+    """Return all parts except those in `without` as obstacles at the given poses."""
     return tuple(make_obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
 
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
-    """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
+    """Return the preferred grasp if the open gripper is clear at every place, else the first candidate that is.
+
+    If none is clear, the preferred one is returned.
+    """
     solid = scene.scenario.assembly.solids[part]
     if any(_clear(scene.kinematics, solid, [preferred], places, _MARGINS_M[-1])):
         return preferred
@@ -85,14 +91,17 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
-    """The first grasp that closes along what is level of a direction of the part, either way, or None.
+    """Return the first clear grasp that closes along the level component of a direction, or None.
 
-    It is clear open and closed: fingers that close flush with a wall beside the part stem against it.
+    It is clear open and closed, since fingers that close flush with a wall next to the part jam against it.
+
+    Args:
+        across: Direction in the frame of the part, (3,); its sign does not matter.
     """
     up = upwards(place.T)
     level = across - (across @ up) * up  # without its vertical part
     level /= np.linalg.norm(level)
-    stays = Stroke(place.T, up, 0.0, place.around)
+    stays = Stroke(place.T, up, 0.0, place.around)  # of length zero, to check the closed gripper
     solid = scene.scenario.assembly.solids[part]
     able = [grasp for grasp in _candidates(scene, solid, place.T) if abs(grasp.across @ level) > 0.99]
     able = [
@@ -104,12 +113,14 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
-    """The grasp for a stroke; if none is clear all the way, however little, one to begin and one to end with.
+    """Return one grasp that is clear along a whole stroke, else two with a change of grip on the way.
 
-    Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
+    Of two, each is clear with closed fingers on its part of the stroke, and both with open fingers at the change. The
+    preferred grasp is tried first, and returned if nothing is clear.
 
     Args:
-        places: Where else the part is picked up or put down, clear for the grasp that is used there.
+        places: Further places at which the part is picked up or put down, before the stroke.
+        stroke: A straight motion to the goal; the part can also be pulled out backwards along it.
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
     solid = scene.scenario.assembly.solids[part]
@@ -133,8 +144,11 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
 
 
 def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
-    """The tip in the part's frame, (4, 4): looking down where the part stands like this, or as the grasp says, closing
-    along `across`."""
+    """Return the pose of the tip in the frame of the part, (4, 4).
+
+    Its z axis points down for a part at `T_part`, or along `grasp.ahead`; its x axis, the closing direction, is
+    `grasp.across`.
+    """
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0]) if grasp.ahead is None else grasp.ahead
     across = grasp.across
     along = float(across @ ahead)
@@ -145,8 +159,14 @@ def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
 
 
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
-    """Half of the width between the fingers of a part that stands at T, [m]: of boxes that of the part, where they hold
-    that."""
+    """Return half the width of the part between the fingers, [m].
+
+    For a part of boxes whose full width the fingers hold, this is half the extent of the part. The same extent is used
+    if the width at the grasp cannot be measured.
+
+    Args:
+        T: Pose of the part, (4, 4), from which a grasp without `ahead` has its vertical.
+    """
     up = upwards(T) if grasp.ahead is None else -grasp.ahead
     own = measure_held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
     if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
@@ -156,12 +176,12 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
 
 
 def _known_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
-    """As found with the grasp; those of a hundred candidates would take seconds."""
+    """Return the half width stored with the grasp, else compute it; a hundred candidates would take seconds."""
     return half_width(pieces, grasp, T) if grasp.half_width is None else grasp.half_width
 
 
 def upwards(T: Array) -> Array:
-    """The vertical in the frame of a part at T; one of its axes where it is near to it."""
+    """Return the vertical in the frame of a part at T, (3,), rounded to an axis within 10 degrees of it."""
     up = T[2, :3]
     k = int(np.abs(up).argmax())
     return np.asarray(np.sign(up[k]) * np.eye(3)[k] if abs(up[k]) > _UPRIGHT else up)
@@ -170,11 +190,17 @@ def upwards(T: Array) -> Array:
 def _pair(
     scene: Scene, solid: Solid, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float
 ) -> Grips | None:
-    """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
+    """Return the first pair of grasps with a change of grip on the way, or None.
+
+    Args:
+        able: First grasps, each with the distance from the end at which the gripper collides, [m], best first.
+        margin: Room around the gripper, [m].
+    """
     goal = RestingPart(stroke.T, stroke.around)
     last = list(_clear(scene.kinematics, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
         change = RestingPart(translate(stroke.T, stroke.direction, -left), stroke.around)
+        # The change happens where the first grasp must stop, if the open gripper is clear there.
         if 0.0 < left < _MOST_LEFT_M and any(_clear(scene.kinematics, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.direction, left, stroke.around)
             for second in _clear(scene.kinematics, solid, last, [change], margin):
@@ -184,7 +210,11 @@ def _pair(
 
 
 def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
-    """Places on the part at T: those of the box around it where they are on a part of boxes, else by its shape."""
+    """Return candidate grasps of a part at T, best first.
+
+    They lie on the bounding box if the part consists of boxes and all of them hold its full width. Else they are found
+    from the shape.
+    """
     up = upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
@@ -194,11 +224,12 @@ def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
 
 
 def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
-    """Across either level axis of the box around a part, the narrower one first, from the middle outwards."""
+    """Return grasps across both level axes of the bounding box, the narrower one first, from the middle outwards."""
     low, high = solid.bounds
     size = high - low
     middle = (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
+    # From the middle of the box up to the height of the tip, in the frame of the part.
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     grasps = []
@@ -218,10 +249,15 @@ def find_clear_grasp(
     places: Sequence[RestingPart],
     strokes: Sequence[Stroke] = (),
 ) -> Grasp | None:
-    """The first of those around which there is most room at every place, and all along strokes, or None."""
+    """Return the first grasp with the largest possible margin, or None if none is clear.
+
+    Args:
+        places: Where the open gripper must be clear.
+        strokes: Along which the closed gripper must be clear.
+    """
     widest, *less = _MARGINS_M
     first = next(_clear(kinematics, solid, grasps, places, widest, strokes), None)
-    # What is not clear with the least room is not with more.
+    # Grasps that are not clear with the least margin are not clear with a larger one.
     left = [] if first is not None else list(_clear(kinematics, solid, grasps, places, less[-1], strokes))
     margins = less[:-1] if left else ()
     return next(
@@ -238,14 +274,17 @@ def _clear(
     margin: float,
     strokes: Sequence[Stroke] = (),
 ) -> Iterator[Grasp]:
-    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place, nor the
-    closed one along any stroke.
+    """Yield the grasps that are clear: the open gripper at all places, and the closed one along all strokes.
 
-    They are computed lazily, some at a time, of these those of one direction and width together.
+    They are computed lazily in batches; within a batch, grasps of the same orientation and width are checked together.
+
+    Args:
+        margin: Room around the gripper, [m].
     """
     T = places[0].T
 
     def kind(grasp: Grasp) -> tuple[float, ...]:
+        """Orientation and width of a grasp: equal for grasps that can be checked together."""
         ahead = () if grasp.ahead is None else map(float, grasp.ahead)
         return (*map(float, grasp.across), round(_known_width(solid.pieces, grasp, T), 6), *ahead)
 
@@ -268,7 +307,7 @@ def _is_clear(
     margin: float,
     strokes: Sequence[Stroke],
 ) -> NDArray[np.bool_]:
-    """Which of some grasps of one direction and width are clear, (k,)."""
+    """Return which of k grasps of the same orientation and width are clear, (k,); see `_clear`."""
     width = _known_width(solid.pieces, same[0], places[0].T)
     opening = min(width + _STAND_OFF_M, kinematics.arm.opening_m)
     points = np.array([grasp.point for grasp in same])
@@ -288,27 +327,42 @@ def _is_clear(
 
 
 def _tips(grasp: Grasp, points: Array, T: Array) -> tuple[Array, Array]:
-    """The orientation of the tip at a grasp of a part at T, (3, 3), and its places at such grasps of points, (k, 3)."""
+    """Return the tip's orientation, (3, 3), and its positions, (k, 3), world, for grasps at k points of a part.
+
+    Args:
+        grasp: Gives the orientation.
+        points: In the frame of the part, (k, 3), [m].
+        T: Pose of the part, (4, 4).
+    """
     R = (T @ make_tip_frame(replace(grasp, point=np.zeros(3)), T))[:3, :3]
     return R, points @ T[:3, :3].T + T[:3, 3]
 
 
 def _nearest(kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke, margin: float) -> float:
-    """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
+    """Return the distance to the end of a stroke at which the closed gripper stops, [m]; 0 if it arrives.
+
+    This is the last checked place before the first collision.
+    """
     lefts = _lefts(stroke)
     struck = _closed_depth(kinematics, solid, grasp, stroke, lefts, margin) > 0.0
+    # argmax: index of the first place with a collision.
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
 
 
 def _lefts(stroke: Stroke) -> Array:
-    """How far it is to the end of a stroke at each look, [m]."""
+    """Return the distances to the end of a stroke, descending, at which collisions are checked, (k,), [m]."""
     return np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
 
 
 def _closed_depth(
     kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float
 ) -> Array:
-    """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
+    """Return how deep the closed gripper intrudes into obstacles at k places of a stroke, (k,), [m].
+
+    Args:
+        lefts: Distances of the places from the end of the stroke, (k,), [m].
+        margin: Room around the gripper, [m].
+    """
     width = _known_width(solid.pieces, grasp, stroke.T)
     tip = stroke.T @ make_tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.direction
@@ -318,12 +372,19 @@ def _closed_depth(
 def gripper_depth(
     kinematics: Kinematics, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
 ) -> Array:
-    """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
+    """Return how deep the gripper intrudes into obstacles at k places, (k,), [m]; negative where it is clear.
 
-    What its way does not come by counts as far away.
+    Obstacles that do not meet the bounding box of all places are skipped; without any, the depth is -1.
+
+    Args:
+        opening: Of each finger, [m].
+        R: Orientation of the tip, (3, 3), world.
+        at: Positions of the tip, (k, 3), world.
+        margin: Room around the gripper, [m].
     """
     boxes = list_gripper_boxes(kinematics, opening, margin)
     low, high = measure_upright_bounds(boxes, R, np.zeros(3))
+    # The bounding box of the gripper at all places together.
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)
     depth = np.full(len(at), -1.0)

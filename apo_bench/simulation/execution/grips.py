@@ -1,4 +1,4 @@
-"""How the gripper holds the part of a transfer, as poses of the tip."""
+"""The grips of a transfer as tip poses: for carrying, for centring a placed part, for squaring one before its pick."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -23,17 +23,23 @@ from apo_bench.simulation.robot import measure_turn
 from apo_bench.simulation.scene import Scene
 
 _WRIST_ENDS = 2.5
-"""A hand that looks down is turned by no more than this from its rest where there is another way, [rad]."""
+"""Greatest turn of a hand that looks down from its rest, [rad]; beyond it, the opposite grip is used."""
 
 
 def transfer_grips(
     scene: Scene, part: str, preferred: Grasp, out: ApproachLine, into: ApproachLine, estimated: Poses, after: Poses
 ) -> tuple[tuple[Grip, ...], ApproachLine, ApproachLine]:
-    """Where to hold the part, and both lines, out and into, with the place where the grip changes.
+    """Choose the grips of a transfer.
 
     Args:
-        estimated: Where all parts are before the transfer.
-        after: Where all parts are after it.
+        preferred: The grasp of the scenario, used if it is clear.
+        out: The line out of the start.
+        into: The line to the goal.
+        estimated: Estimated poses of all parts before the transfer.
+        after: Their poses after it.
+
+    Returns:
+        One grip or two, in the order of use, and the lines out and into with the place where the grip changes.
     """
     start = RestingPart(estimated[part], list_obstacles(scene.scenario.assembly.solids, estimated, (part,)))
     goal = RestingPart(after[part], list_obstacles(scene.scenario.assembly.solids, after, (part,)))
@@ -43,6 +49,7 @@ def transfer_grips(
         into = ApproachLine(into.direction, into.travel, grips.left)
     elif out.level:
         stroke = Stroke(start.T, out.direction, out.travel, start.around)
+        # The part is pulled out backwards, so the grips are chosen for the insertion and used in the reverse order.
         backwards = grips_along(scene, part, preferred, (goal,), stroke)
         grips = backwards if backwards.second is None else Grips(backwards.second, backwards.left, backwards.first)
         out = ApproachLine(out.direction, out.travel, backwards.left)
@@ -53,7 +60,11 @@ def transfer_grips(
 
 
 def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> Grip:
-    """The grasp as a pose of the tip; of the two ways round, the one that turns the wrist less."""
+    """Return a grasp as a tip pose; of the two opposite ones, that which turns the wrist less at start and goal.
+
+    Args:
+        start, goal: Poses of the part, (4, 4).
+    """
     other = replace(grasp, across=-grasp.across)
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [make_tip_frame(each, start) for each in (grasp, other)]
@@ -65,10 +76,16 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
 def centring_grips(
     assembly: Assembly, scene: Scene, k: int, grip: Grip, macros: tuple[Motion, ...], after: Poses
 ) -> tuple[Grip, ...]:
-    """Grips across the level directions in which the part's place will matter and nothing has settled it.
+    """Return grips that centre a placed part in level directions that matter later and are still undetermined.
 
-    Closing fingers centre a part in their own direction only; along them it has drifted in the hand. What fits into
-    or onto the part later needs it in its place across the walls of that fit.
+    Fingers centre a part along their closing direction only; across it, the part may have drifted in the hand. Later
+    fits need the part in its place across their walls.
+
+    Args:
+        k: The operation that places the part.
+        grip: The grip in which the part is placed.
+        macros: Those of the operation; a slide determines its direction.
+        after: Poses of all parts after the operation.
     """
     part = assembly.operations[k].main
     sides = [macro.direction for macro in macros if macro.name == "slide-to-contact"]
@@ -78,10 +95,14 @@ def centring_grips(
 
 
 def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimated: Poses) -> tuple[Grip, ...]:
-    """Grips across the level directions in which the part will have to be known and the grip itself does not settle it.
+    """Return grips that square a part before its pick, in level directions that matter and that `grip` leaves open.
 
-    All are turned from it the same way, by a quarter, unless the wrist ends there: a tip that is off on the hand then
-    shifts every part by the same.
+    Each is turned from `grip` by a quarter turn in the same sense, unless the wrist cannot. So the tool error shifts
+    every part by the same amount.
+
+    Args:
+        k: The operation that moves the part.
+        estimated: Estimated poses of all parts before the operation.
     """
     part = assembly.operations[k].main
     T = estimated[part]
@@ -103,8 +124,15 @@ def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimat
 def _across_walls(
     scene: Scene, part: str, grip: Grip, walls: Iterable[Array], place: RestingPart, sides: Iterable[Array]
 ) -> list[Grasp]:
-    """A clear grasp across each level wall of the part at its place that neither the grip nor sides settle."""
+    """Return a clear grasp across each wall whose normal is level and not yet determined.
+
+    Args:
+        grip: Determines the position along its closing direction.
+        walls: Normals in the frame of the part, (3,) each.
+        sides: Further determined directions, (3,) each, world.
+    """
     R = place.T[:3, :3]
+    # Column 0 of a tip pose is its closing direction. Directions less than 60 degrees apart count as the same.
     settled = [R @ grip.T_part_tip[:3, 0], *sides]
     grasps = []
     for wall in walls:

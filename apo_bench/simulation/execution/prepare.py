@@ -1,6 +1,6 @@
-"""Prepare the transfers of a plan: grasps, lines, guards, and whether the arm reaches them.
+"""Prepare the transfers of a plan: choose grips, lines and guards, and check that the arm reaches them.
 
-Only what is known before the robot moves is used.
+Only information that is known before the robot moves is used.
 """
 
 from dataclasses import replace
@@ -39,44 +39,45 @@ from apo_bench.simulation.execution.transfer import (
 from apo_bench.simulation.robot import Trajectory, follow_waypoints, plan_waypoints, solve_end_angles
 from apo_bench.simulation.scene import Scene
 
-_GRAVITY = 9.81
-_PLACE_WEIGHTS = 6.0  # guard of what is put down, in its weights
+_GRAVITY = 9.81  # [m/s^2]
+_PLACE_WEIGHTS = 6.0  # guard of putting down, in weights of the moved parts
 _INSERT_WEIGHTS = 2.5  # guard of an insertion, in weights of the lightest part that it could push along
 _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the side: friction of 0.8 holds 0.8 of them
 _FIRM_N = 80.0
-"""Friction of both pads. Through walls that are not the last, the bore of an upper plate, a firm hand carries on at
-speed; its rim strikes the part with some 30 N, which moves it in a weaker hand, and the plate."""
+"""Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
+an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
 _FINGER_M = 0.01
-"""How far fingers reach below their tip."""
+"""Length of the fingers below the tip."""
 
 
 class Move(NamedTuple):
-    """A step of the schedule with its transfer; undoing and doing again at once is one move."""
+    """A step of the schedule with its transfer; undoing an operation and repeating it at once is one move."""
 
     step: Step
     transfer: Transfer
 
 
 @remember
-def plan_moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
-    """What to do for each step of the schedule; what moves with a part stays with it.
+def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...]) -> tuple[Move, ...]:
+    """Return the move of each step of the schedule.
 
-    Cached: the plan check and the execution both need it.
+    Cached, since both the plan check and the execution need the moves.
 
     Args:
-        spiral: Whether the robot searches for a hole where a motion into it is stopped.
-        actions: Of `PROBING_ACTIONS`: `square` parts before it takes them, `lay` them flat before it inserts them.
+        spiral: Whether the robot searches for a hole when a motion into it is stopped.
+        actions: Of `PROBING_ACTIONS`; `square`, `lay` and `search` change the transfers.
     """
     estimated: Poses = plan.start
     put_by: dict[str, int | None] = {}
-    """Part -> the operation that had put it where it is; none where it started."""
+    """Part -> the operation that put it where it is; None for its start."""
     before: dict[int, tuple[Array, int | None]] = {}
-    """Operation -> where its part was before it, and what had put it there."""
+    """Operation -> pose of its part before it, (4, 4), and the operation that had put the part there."""
     prepared = []
     for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
         k = step.operation
         operation = plan.assembly.operations[k]
         again = plan.schedule[i + 1 : i + 2] == (Step(k),)
+        # If the operation is repeated at once from above, the part goes straight to its new goal.
         if (
             step.undo
             and again
@@ -99,7 +100,10 @@ def plan_moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[st
 
 
 def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
-    """The transfer with its grips the other way round, where only that is in reach; the usual arm has room for one."""
+    """Return the transfer with its grips turned by a half turn if only that is in reach, else unchanged.
+
+    The default arm (without `hand`) reaches the grips as they are, so it is not checked.
+    """
     if scene.arm.hand is None or not solve_key_angles(transfer, scene).code:
         return transfer
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -110,7 +114,7 @@ def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False, ()))
 
 
 def _transfer(
@@ -123,36 +127,40 @@ def _transfer(
     after: Poses,
     spiral: bool,
 ) -> Transfer:
-    """One step as the robot will carry it out.
+    """Return the transfer of one step.
 
     Args:
-        was: The operation that had put the part where it is, None if it stands where it started.
-        target: The target pose of its main part, (4, 4).
-        estimated: Where all parts are before it.
-        after: Where all parts are after it.
+        was: The operation that put the part where it is, None if it stands where it started.
+        target: Target pose of its main part, (4, 4), world.
+        estimated: Estimated poses of all parts before the step.
+        after: Their poses after it.
+        spiral: Whether the robot searches for holes.
     """
     k, undo = step
     operation = assembly.operations[k]
     part = operation.main
     start = estimated[part]
     nominal = list_nominal_operations(scene.scenario)[k]
+    # Contacts at the start and at the goal: before or after this operation, as the scenario states them.
     leaves = nominal.after if undo or was == k else nominal.before
     comes = nominal.before if undo else nominal.after
     contacts = tuple(each.contact for each in comes.touched)
     into = plan_arrival_line(comes, target)
     inserts = any(macro.inserts for macro in comes.macros)
-    if undo and not into.level:
+    if undo and not into.level:  # back at its start the part is put down, whatever it touches there
         into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
     out = plan_arrival_line(leaves, start)
     preferred = scene.scenario.grasps[k if was is None or not out.level else was]
     grips, out, into = transfer_grips(scene, part, preferred, out, into, estimated, after)
     macros = motions(comes, target, slide_directions(assembly, comes, after))
     top, bottom = ends_of(assembly, operation.moves, estimated)
+    # Height of the tip over the lowest point of the moved parts.
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     ways = mouths(assembly, comes, after, into.direction)
+    # A hand that does not hold firmly is slow from the first entrance on.
     first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
@@ -180,14 +188,17 @@ def _transfer(
 
 
 def holds_firmly(arm: Arm) -> bool:
-    """Whether a hand may carry a part past the first of several entrances at speed; the usual arm's may."""
+    """Whether a hand may carry a part past the first of several entrances at speed; that of the default arm may."""
     return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
 
 
 def _with_actions(
     assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses, actions: tuple[str, ...]
 ) -> Transfer:
-    """The transfer with the probing actions; a part that stands between others stays so."""
+    """Return the transfer with probing actions.
+
+    A part that is enclosed at its start, or touches another at its side, is neither squared nor laid down there.
+    """
     free = not (t.out.level or t.away or t.drawn)
     squared = "square" in actions and free
     laid = "lay" in actions and (t.into.level or (bool(t.entrances) and free))
@@ -206,13 +217,20 @@ def _with_actions(
 
 
 def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, direction: Array) -> Array:
-    """The middle of where what moves ends ahead, in the frame of its main part, (3,), [m].
+    """Return the foremost point of the moved parts in the frame of the main part, (3,), [m].
 
-    It is the middle of the upright box around what moves, in that frame, put forward to the end along the way.
+    This is the middle of their bounding box in that frame, moved to their foremost end along the direction.
+
+    Args:
+        part: The main part.
+        moves: All parts that move, the main part included.
+        poses: Poses of all parts at the goal.
+        direction: Unit vector of the insertion, (3,), world.
     """
     T = {p: pose.inverse(poses[part]) @ poses[p] for p in moves}
 
     def ends(axis: Array) -> tuple[float, float]:
+        """Least and greatest coordinate of the moved parts along an axis of the main part, [m]."""
         spans = [np.add(measure_extent(scene.pieces[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
         return float(np.min(spans)), float(np.max(spans))
 
@@ -222,20 +240,22 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, direct
 
 
 class KeyAngles(NamedTuple):
-    """Joint angles at the tip poses of a transfer that must be in reach, [rad]."""
+    """Joint angles at the key tip poses of a transfer, [rad]."""
 
     code: str
-    """Of the first end at which a tip pose has no joint angles, empty where all have."""
+    """Empty if all are in reach; else `unreachable_start` or `unreachable`, by the first pose that is not."""
     reached: tuple[Array, ...]
-    """(joints,) each, at the poses before that."""
+    """Joint angles, (joints,) each, at the poses before the first one out of reach."""
     ended: Array
-    """Where the search for the last of them ended, (joints,)."""
+    """Joint angles, (joints,), at which the last solution of inverse kinematics ended, also without success."""
 
 
 @remember
 def solve_key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
-    """Joint angles at the tip poses that must be in reach; remembered, since who predicts a transfer and who carries it
-    out ask for the same."""
+    """Solve inverse kinematics at the key tip poses of a transfer, in their order, from the home position.
+
+    Cached, since both the failure prediction and the execution need the result.
+    """
     q = np.array(scene.arm.home)
     before = None
     reached = list[Array]()
@@ -243,7 +263,7 @@ def solve_key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     for T in (*taken, *put):
         there = scene.kinematics.inverse(T, q)
         if there is None and scene.arm.hand is not None:
-            # Step by step from where the tip was, since a leap may end at the limit of a joint.
+            # Along a line from the pose before, since a direct solution may end at a joint limit.
             start = scene.kinematics.forward(q) if before is None else before
             there = solve_end_angles(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
         if there is None:
@@ -252,7 +272,7 @@ def solve_key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
         before = T
         reached.append(q)
     if len(reached) == len(taken + put) and scene.arm.hand is not None:
-        # What is held goes through the air from the last of the first to the first of the others.
+        # The way through the air, from the last pose at the start to the first at the goal, must be in reach too.
         k = len(taken)
         direction = plan_waypoints(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
         if follow_waypoints(scene.kinematics, taken[-1], direction, reached[k - 1]) is None:

@@ -1,6 +1,6 @@
-"""Cache the states of replays, so that replays with the same beginning share it.
+"""Cache the states of replays, so that replays with the same first moves simulate these only once.
 
-MuJoCo goes on from a state exactly, so a result does not depend on the cache.
+MuJoCo continues from a saved state exactly, so results do not depend on the cache.
 """
 
 import hashlib
@@ -18,33 +18,43 @@ from apo_bench.simulation.robot import Robot
 from apo_bench.simulation.scene import wake
 
 _MOST = 4096
-"""States, and results, that are kept, 5 kB each; the oldest go first."""
-_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""Greatest number of states, and of results, of 5 kB each; the oldest are dropped first."""
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # everything on which the next step depends
 
 
 class Progress(NamedTuple):
-    """What a replay has reached so far."""
+    """The snapshots and times that a replay has recorded so far."""
 
     after: list[Snapshot | None]
-    """For each operation, the state when it was done; None while it is not, or when it is undone."""
+    """For each operation, the snapshot when it was done; None before, or if it is undone."""
     timeline: list[tuple[Step, float]]
-    """Steps that are done, each with the simulated time of its end, [s]."""
+    """The finished steps, each with the simulated time of its end, [s]."""
 
 
 class SavedState(NamedTuple):
-    """All that decides how a replay goes on."""
+    """The complete state from which a replay continues."""
 
     state: Array
+    """MuJoCo's integration state."""
     sensors: Array
+    """`MjData.sensordata`, which the integration state lacks."""
     welds: Array
+    """`MjModel.eq_data`, which a weld of the gripper changes."""
     robot: tuple[Any, ...]
+    """From `Robot.memory`."""
     grip: int
-    """Which of the grips of the move is in use."""
+    """Index of the grip in use among those of the move."""
     progress: Progress
 
 
 def save_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
-    """The present state; nothing sleeps in it, nor now."""
+    """Return the present state, after waking all sleeping parts.
+
+    Restored states have no sleeping parts either, so both continue in the same way.
+
+    Args:
+        grip: Index of the grip in use.
+    """
     model = robot.model
     data = robot.data
     wake(robot.scene.work, data)
@@ -55,7 +65,7 @@ def save_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
 
 
 def restore_state(saved: SavedState, robot: Robot) -> None:
-    """Bring a robot, and all around it, to a state that was saved."""
+    """Set the physics and the controller of a robot to a saved state."""
     robot.model.eq_data[:] = saved.welds
     mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
     robot.data.sensordata[:] = saved.sensors
@@ -65,34 +75,42 @@ def restore_state(saved: SavedState, robot: Robot) -> None:
 
 @final
 class ReplayCache:
-    """What the replays of one scene have in common, kept for the trials of one seed; they run in one process."""
+    """Saved states and results of the replays of one scene, for the trials of one seed in one process."""
 
     def __init__(self) -> None:
         self._states: dict[bytes, SavedState] = {}
         self._results: dict[bytes, ReplayResult] = {}
 
     def ended(self, key: bytes) -> ReplayResult | None:
-        """The result of a replay that was the same from its beginning to its end."""
+        """Return the result of an earlier replay with the same moves, None if there was none."""
         return self._results.get(key)
 
     def end(self, key: bytes, result: ReplayResult) -> None:
-        """Keep the result of a replay under its key."""
+        """Store the result of a finished replay under the key of its last state."""
         self._results[key] = result
         _drop_oldest(self._results)
 
     def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
-        """Keep the present state under its key; nothing sleeps in it."""
+        """Store the present state under its key, and wake all parts, as `save_state` does.
+
+        Args:
+            grip: Index of the grip in use.
+        """
         if key not in self._states:
             self._states[key] = save_state(robot, grip, progress)
             _drop_oldest(self._states)
         else:
-            wake(robot.scene.work, robot.data)
+            wake(robot.scene.work, robot.data)  # as if saved, so that results do not depend on the cache
 
     def resume(self, keys: Sequence[bytes], robot: Robot, progress: Progress) -> tuple[int, int]:
-        """Take up the furthest state that was kept.
+        """Restore the furthest stored state of a replay.
+
+        Args:
+            keys: Those of all states of the replay, in order.
+            progress: Set to the progress of the stored state.
 
         Returns:
-            How many of the keys lead to it, 0 if nothing was kept; and the grip that is in use there.
+            The number of keys up to this state, 0 if none is stored, and the index of the grip in use.
         """
         for i in range(len(keys), 0, -1):
             saved = self._states.get(keys[i - 1])
@@ -105,6 +123,7 @@ class ReplayCache:
 
 
 def _drop_oldest(kept: dict[bytes, Any]) -> None:
+    """Drop the oldest entry if there are more than `_MOST`."""
     if len(kept) > _MOST:
         del kept[next(iter(kept))]
 
@@ -112,12 +131,20 @@ def _drop_oldest(kept: dict[bytes, Any]) -> None:
 def cache_keys(
     scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]], error: Any = None
 ) -> list[bytes]:
-    """A key of the past of each state: two for each move, one when the part is lifted, one when the move is done."""
+    """Return two keys for each move: of the state when its part is lifted, and of that when the move is done.
+
+    A key is a digest of everything that influenced the state.
+
+    Args:
+        start: True poses of the parts at the beginning.
+        error: The errors of the robot.
+    """
     digest = hashlib.sha256(
         _bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity, error))
     )
     keys = []
     for step, t in moves:
+        # Until its part is lifted a move depends on fewer fields, so more replays share this state.
         before = digest.copy()
         before.update(_bytes(_until_lifted(t)))
         digest.update(_bytes((step, t)))
@@ -126,13 +153,13 @@ def cache_keys(
 
 
 def _until_lifted(t: Transfer) -> tuple[Any, ...]:
-    """All of a transfer that matters until its part is lifted."""
+    """Return the fields of a transfer that influence the state until its part is lifted."""
     grips = t.grips[: 1 if t.out.left is None else 2]
     return (t.part, t.carried, t.T_world_start, grips, t.out, t.departs, t.over, t.safe, t.clearance)
 
 
 def _bytes(x: Any) -> bytes:
-    """Equal for equal content."""
+    """Return bytes that are equal for equal content of arrays, dataclasses and sequences."""
     if isinstance(x, np.ndarray):
         return x.tobytes() + b";"
     if is_dataclass(x):

@@ -1,8 +1,7 @@
-"""Search for a hole where force stops an insertion.
+"""Search for a hole along spirals when force stops an insertion, then continue the insertion compliantly.
 
-Spirals follow under a light push at several yaws; then the part goes on, giving way across.
-
-The robot knows what it commands and the force on the part in its hand; it never reads where a part is.
+The spirals run under a light push at several yaw angles. The robot uses its commands and the force on the held part; it
+never reads the true pose of a part.
 """
 
 import numpy as np
@@ -14,39 +13,45 @@ from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Guard, Robot, Trajectory, servo, smooth_trajectory, translate
 
 RADIUS_M = 0.002
-"""The robot searches for a hole so far off."""
-YAWS_DEG = (1.0, -1.0, 2.0, -2.0)  # turns about the vertical at which shorter spirals follow
-YAWED_RADIUS_M = 0.001  # how far these go
-_BACK_M = 0.0005  # drawn back so far, a part touches nothing ahead
+"""Greatest offset of the hole that the search covers."""
+YAWS_DEG = (1.0, -1.0, 2.0, -2.0)  # yaw angles of the further, shorter spirals
+YAWED_RADIUS_M = 0.001  # radius of these spirals
+_BACK_M = 0.0005  # distance back after which a part touches nothing ahead
 _BACK = 0.005  # peak speed [m/s] back
-_BRING = 0.03  # peak speed [m/s] to where a spiral begins
+_BRING = 0.03  # peak speed [m/s] to the begin of a spiral
 _DEEP_M = 0.001
-"""What goes so much deeper than where it was stopped has found the hole."""
+"""Depth beyond the stop from which the hole counts as found."""
 SEARCHES = 3
-"""A motion is searched for so many times at most, in one transfer up to twice as often."""
-_PIECE_M = 0.01  # giving way, the tip goes on in pieces of this length
-_NOTHING_M = 1e-6  # less than this is nothing
+"""Greatest number of searches in one motion; a transfer has up to two such motions."""
+_PIECE_M = 0.01  # length of the pieces in which the compliant insertion proceeds
+_NOTHING_M = 1e-6  # a shorter remaining distance counts as none
 
 
 def press_in(
     robot: Robot, t: Transfer, grip: Grip, line: Trajectory, guard: Guard, near: float
 ) -> tuple[float, Array | None]:
-    """A guarded motion of the tip that may search where it is stopped farther than `near` [m] from its end.
+    """Follow a line with a guard, and search for the hole if the motion stops too early.
+
+    Args:
+        line: From the present tip pose.
+        guard: Force limit in the direction of the motion.
+        near: Distance from the end of the line, [m]; a stop farther away starts a search.
 
     Returns:
-        What is left of it, [m], and what brings the poses that were meant to those that were found, (4, 4), world; None
-        if nothing was searched for or found.
+        What is left of the line, [m], and the transform from planned poses to found ones, (4, 4), world. The transform
+        is None without a search, or if the search found nothing.
     """
     left = robot.follow(line, guard)
-    if t.front is None:
+    if t.front is None:  # this transfer does not search
         return left, None
     end = line.end
     T_search = None
-    aside = 0.0
+    aside = 0.0  # offset of the searches so far, [m]
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
     for _ in range(SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
+        # The point of the line at the depth of the tip.
         stopped = translate(end, guard.direction, float((robot.T - end)[:3, 3] @ guard.direction))
         macro = robot.macro
         robot.macro = "search"
@@ -64,21 +69,22 @@ def press_in(
 
 
 def after_search(T_search: Array | None, T: Array) -> Array:
-    """A pose that was meant, as it has to be after a search."""
+    """Return a planned pose moved by the transform of `press_in`; unchanged if this is None."""
     return T if T_search is None else T_search @ T
 
 
 def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press: float, radius: float) -> Array | None:
-    """Look for the hole across a motion that was stopped; the tip is where it was stopped again if there is none.
+    """Search for the hole by spirals across a motion that was stopped; without success return to `stopped`.
 
     Args:
-        stopped: The tip pose on the line that was meant, as deep as it came.
-        front: The point about which the part is turned, (3,), world, [m].
-        press: The push under which spirals go across, [N].
-        radius: How far off the hole may be, [m].
+        stopped: The tip pose on the planned line at the depth of the stop, (4, 4).
+        front: The point about which the part is yawed, (3,), world, [m].
+        guard: Direction and force limit of the stopped motion.
+        press: The push along this direction during a spiral, [N].
+        radius: Greatest offset of the hole, [m].
 
     Returns:
-        What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
+        The transform from planned poses to found ones, (4, 4), world; None if nothing was found.
     """
     off = translate(stopped, guard.direction, -_BACK_M)
     for yaw in (0.0, *YAWS_DEG):
@@ -96,7 +102,14 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
 
 
 def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
-    """Go on as deep as a tip pose, giving way across; returns how far aside of it the tip ends, (3,), world, [m]."""
+    """Continue to the depth of a tip pose, compliant to lateral forces.
+
+    Args:
+        end: The tip pose, (4, 4).
+
+    Returns:
+        Lateral offset of the tip from this pose at the end, (3,), world, [m].
+    """
     while (left := float((end - robot.T)[:3, 3] @ guard.direction)) > _NOTHING_M:
         easing = Easing(guard, min(left, _PIECE_M), robot.step_s)
         servo(robot, easing)
@@ -107,12 +120,12 @@ def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
 
 
 def _approach(robot: Robot, T: Array, direction: Array) -> None:
-    """Back first, so that nothing is touched on the way."""
+    """Move back along the direction, so that nothing is touched on the way, then to a tip pose T."""
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, direction, -_BACK_M), _BACK))
     robot.follow(smooth_trajectory(robot.T, T, _BRING))
 
 
 def _yaw_about(yaw_deg: float, about: Array) -> Array:
-    """The turn about the vertical through a point, (4, 4), world."""
+    """Return the rotation about the vertical through a point, (3,), as a transform, (4, 4), world."""
     R = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw_deg))[:3, :3]
     return frame(R, about - R @ about)

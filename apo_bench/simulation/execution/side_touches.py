@@ -1,8 +1,8 @@
-"""Find where the side of a held part can touch a fixed wall, before the part is inserted from above.
+"""Find where the side of a held part can touch a fixed wall, to measure its pose before an insertion from above.
 
-The part leans towards the wall and touches it with the place of its side at the height of its upper edge. Two places,
-one low and one high, show where the part lies along the pads and how it is turned about their normal: the feet of a
-small round part are too near to each other to show its tilt.
+The part leans towards the wall and touches its upper edge with a point of its side. Two touches, one low and one high
+on the part, show its position along the pads and its turn about their normal. The feet of a small round part are too
+close together to show this turn when it is laid flat.
 """
 
 from collections.abc import Iterator
@@ -21,36 +21,38 @@ from apo_bench.simulation.robot import Obstacle, measure_turn, move_to_height
 from apo_bench.simulation.scene import Scene
 
 LEAN_RAD = float(np.radians(3.0))
-"""More than a part that was laid down is still turned in the hand."""
+"""Angle by which the part leans: more than a part that was laid flat is still tilted in the hand."""
 STAND_OFF_M = 0.004
-"""A touch begins so far before it is expected."""
+"""Distance before the expected contact at which a touch begins."""
 _OVER_M = 0.003
-"""The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
+"""Height of the lower point over the lowest point of the part, and least height of this one over the wall's foot."""
 _APART_M = 0.01
-"""Places that are less far apart determine a tilt no better than feet do."""
-_ROOM_M = 0.001  # everything else stays so far away
-_STEP_M = 0.002  # places along the wall are so far apart
-_CHECKED_M = 0.004  # on the way down room is checked at places this far apart
+"""Least distance of both points; closer ones determine a tilt no better than feet do."""
+_ROOM_M = 0.001  # distance to all other parts
+_STEP_M = 0.002  # spacing of the places along the wall
+_CHECKED_M = 0.004  # spacing of the places checked on the way down
 
 
 class SideTouch(NamedTuple):
-    """One touch of a wall with the side of a part."""
+    """One guarded motion of a held part, and the point and wall that touch at its end."""
 
     T: Array
-    """Where the part is when the motion begins, (4, 4), world."""
+    """Pose of the part when the motion begins, (4, 4), world."""
     direction: Array
-    """Unit vector, (3,), world: into the wall, along which the pads do not give way."""
+    """Direction of the motion, into the wall: unit vector, (3,), world. The pads do not give way along it."""
     point: Array
-    """What touches, (3,), in the frame of the part, [m]."""
+    """Point of the part that touches, (3,), in the frame of the part, [m]."""
     normal: Array
-    """Of the wall, outwards, (3,), world."""
+    """Unit normal of the wall, outwards, (3,), world."""
     edge: Array
-    """Where it is touched, (3,), world, [m]."""
+    """Point of the wall's upper edge that is touched, (3,), world, [m]."""
 
 
 def upright_walls(assembly: Assembly, poses: Poses) -> Iterator[tuple[str, Face]]:
-    """Upright flat faces of what is fixed that something is fitted to, and those around a bore that something is
-    fitted into."""
+    """Yield part and face of the upright flat faces of fixed parts that take part in a contact, each once.
+
+    For a contact of a round face, such as a bore, these are all upright flat faces of its part.
+    """
     done = set[tuple[str, str]]()
     for operation in assembly.operations:
         for contact in operation.contacts:
@@ -70,25 +72,25 @@ def upright_walls(assembly: Assembly, poses: Poses) -> Iterator[tuple[str, Face]
 def find_side_touches(
     assembly: Assembly, scene: Scene, t: Transfer, upright: Array, estimated: Poses
 ) -> tuple[SideTouch, ...]:
-    """A low and a high place of the part at one wall; none where there is no room.
+    """Return a low and a high touch of one wall, or an empty tuple if no wall has room.
 
     Args:
-        upright: How the part stands, (3, 3), world, but for its turn about the vertical.
-        estimated: Where all parts are before the transfer.
+        upright: Orientation of the part, (3, 3), world; its turn about the vertical may change.
+        estimated: Estimated poses of all parts before the transfer.
     """
     for part, face in upright_walls(assembly, estimated):
         n = estimated[part][:3, :3] @ face.normal
         corners = pose.apply(estimated[part], face.outline)
         low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
-        deep = high - low - _OVER_M
-        if face.fit or deep - _OVER_M < _APART_M:
+        deep = high - low - _OVER_M  # height of the higher point over the lowest one of the part
+        if face.fit or deep - _OVER_M < _APART_M:  # a face with clearance, or a wall that is too low
             continue
         (wall,) = list_obstacles(assembly.solids, estimated, tuple(set(assembly.solids) - {part}))
         others = list_obstacles(assembly.solids, estimated, (t.part, part))
         along = np.cross(UP, n)
         ends = corners @ along
         lines = np.arange(ends.min() + _STEP_M, ends.max(), _STEP_M)
-        for at in sorted(lines, key=lambda at: abs(at - ends.mean())):
+        for at in sorted(lines, key=lambda at: abs(at - ends.mean())):  # from the middle of the wall outwards
             edge = at * along + float(n @ corners[0]) * n + high * UP
             for R in _upright_turns(scene, t, upright, n):
                 both = tuple(_at(scene, t, R, n, edge, up) for up in (_OVER_M, deep))
@@ -98,7 +100,10 @@ def find_side_touches(
 
 
 def _upright_turns(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[Array]:
-    """How the part stands, (3, 3), when the pads are along the wall's normal, either way, the nearer to rest first."""
+    """Return both orientations, (3, 3), in which the y axis of the tip is along the wall's normal n, either way.
+
+    The fingers then close along the wall. The orientation that turns the wrist less comes first.
+    """
     rest = scene.kinematics.forward(scene.arm.home)
     y = upright @ t.grips[0].T_part_tip[:3, 1]
     both = []
@@ -109,10 +114,17 @@ def _upright_turns(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[
 
 
 def _at(scene: Scene, t: Transfer, R: Array, n: Array, edge: Array, up: float) -> SideTouch:
-    """The part before the wall, leaned towards it, with a point of its side that is so high over its lowest one."""
+    """Return the touch with the point of the part's side at a height `up`, [m], over its lowest point.
+
+    Args:
+        R: Orientation of the part before it leans, (3, 3), world.
+        n: Normal of the wall, outwards, (3,), world.
+        edge: Point of the wall's upper edge to touch, (3,), world, [m].
+    """
     pieces = scene.pieces[t.part]
     along = np.cross(UP, n)
     sides = measure_extent(pieces, R.T @ along)
+    # In world axes: at this height, on the side towards the wall, in the middle along it; then in the part's frame.
     point = R.T @ (
         (measure_extent(pieces, R.T @ UP)[0] + up) * UP
         + measure_extent(pieces, R.T @ n)[0] * n
@@ -123,12 +135,13 @@ def _at(scene: Scene, t: Transfer, R: Array, n: Array, edge: Array, up: float) -
 
 
 def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: tuple[Obstacle, ...]) -> bool:
-    """Whether part and hand have room on the way straight down and to the wall, and the arm reaches there."""
+    """Whether part and hand have room on the way straight down and into the wall, and the arm reaches both ends."""
     grip = t.grips[0]
     tip = place.T @ grip.T_part_tip
     above = np.arange(0.0, t.safe, _CHECKED_M)[:, None] * UP
     aside = _ROOM_M * np.cross(UP, place.normal)
     into = (STAND_OFF_M + _ROOM_M) * place.direction
+    # Shifts of the hand: on the way down and at the end in the wall, each with room on both sides along the wall.
     whole = np.vstack([above + aside, above - aside, into + aside, into - aside])
     R = place.T[:3, :3]
     for each, shifts in ((wall, above), *((other, whole) for other in others)):

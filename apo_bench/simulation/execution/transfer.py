@@ -1,4 +1,4 @@
-"""The transfer of one part, with what it carries: grips, lines, macros, guards."""
+"""The transfer of one part and the parts that it carries: the grips, approach lines, macros and guards."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final
@@ -14,52 +14,58 @@ from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot import move_to_height, translate
 
 _AHEAD_M = 0.01
-"""A motion from above is guarded from so far above where it turns slow."""
+"""Distance above the slow stretch at which the guarded motion from above begins."""
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
 _HOVER_M = 0.11
-"""How far before a grasp the hand comes to a stand."""
-_STRAIGHT = 0.99
-_DOWN = float(np.cos(np.radians(10.0)))
+"""Distance before a grasp at which the hand stops."""
+_STRAIGHT = 0.99  # downward component from which a direction counts as straight down
+_DOWN = float(np.cos(np.radians(10.0)))  # downward component below which a tip counts as tilted
 ASIDE_M = 0.006
-"""A slide begins this far from the side that it will touch; what touches at its side is moved off as far before it is
-lifted, since in the hand it drifts into its neighbour."""
+"""Distance from the touched side at which a slide begins.
+
+A part that touches another at its side is moved off by the same distance before it is lifted. Otherwise it may drift
+against its neighbour in the hand.
+"""
 
 
 PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
-"""How a part that was taken off is put down, in the world."""
+"""Straight down, in the world: how a part is put down that touches nothing known, or whose operation is undone."""
 
 
 class Grip(NamedTuple):
-    """How the gripper holds the part."""
+    """The pose of the tip at a part, and the opening at which the fingers touch it."""
 
     T_part_tip: Array
+    """Pose of the tip in the frame of the part, (4, 4)."""
     half_width: float
     """Half the part's width between the fingers, [m]."""
 
     def with_tip_at(self, T: Array) -> "Grip":
-        """The grip of a tip that comes to be at T, (4, 4), in the frame of where the robot estimates it."""
+        """Return the grip of a robot whose real tip is at T, (4, 4), in the frame of the estimated tip."""
         return Grip(self.T_part_tip @ T, self.half_width)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ApproachLine:
-    """A straight way of the part, in the direction in which the part is attached."""
+    """A straight motion of the part, in the direction in which it is attached."""
 
     direction: Array
     """Unit vector of the motion towards the goal, (3,), world."""
     travel: float
+    """Length of the motion, [m]."""
     left: float | None = None
-    """How far before its end the grip changes, [m]; None if it does not."""
+    """Distance before its end at which the grip changes, [m]; None if it does not."""
 
     @property
     def level(self) -> bool:
+        """Whether the direction is nearer to level than to vertical."""
         return bool(abs(self.direction[2]) < 0.5)
 
 
 class Motion(NamedTuple):
-    """A macro of the plan, as the robot carries it out."""
+    """A macro of the plan with its direction in the world."""
 
     name: MacroName
     direction: Array
@@ -69,58 +75,64 @@ class Motion(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """What the controller needs to move one part; every pose in the world."""
+    """Everything that the controller needs to move one part; all poses in the world."""
 
     part: str
     carried: tuple[str, ...]
+    """The parts that move with it."""
     T_world_start: Array
     T_world_goal: Array
     grips: tuple[Grip, ...]
     """In the order of their use; the next one at each change of grip."""
     out: ApproachLine
-    """The way out of where it is, as it was once attached there: it is gone backwards."""
+    """The line on which the part was once attached at its start; it leaves along it backwards."""
     into: ApproachLine
+    """The line to the goal."""
     centring: tuple[Grip, ...]
-    """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
+    """Grips in which the fingers close and open after the part was placed, to centre it between them."""
     departs: tuple[Motion, ...]
-    """The macros by which it leaves its contacts, apart from being lifted."""
+    """The macros by which the part leaves its contacts, apart from being lifted."""
     macros: tuple[Motion, ...]
-    """The macros by which it comes into its contacts; the first of them goes along `into`."""
+    """The macros by which the part makes its contacts; the first of them is along `into`."""
     over: float
-    """Height of the tip at which the empty hand passes over everything that stands, [m]."""
+    """Height of the tip at which the empty hand passes over all parts, [m]."""
     safe: float
-    """Height of the tip at which the part is carried over everything that stands, [m]."""
+    """Height of the tip at which the part is carried over all others, [m]."""
     slow: float
-    """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
+    """Distance before the goal from which a motion from above is slow, since contact may come, [m]."""
     entrances: tuple[float, ...]
-    """So far before the goal the part comes to where walls begin that it goes between, [m]."""
+    """Distances before the goal at which the part enters between walls, [m], the farthest first."""
     weight_n: float
-    """The weight of the part and what it carries, [N]."""
+    """Weight of the part and the parts that it carries, [N]."""
     place_n: float
-    """Guard of a motion onto a support, [N]."""
+    """Force limit of a motion onto a support, [N]."""
     insert_n: float
-    """Guard of an insertion, below the force at which a neighbour would slide, [N]."""
+    """Force limit of an insertion, below the force at which a neighbour would slide, [N]."""
     slide_n: float
-    """Guard of a slide, below the force at which what is touched would slide, [N]."""
+    """Force limit of a slide, below the force at which the touched part would slide, [N]."""
     clearance: float
-    """What lay free falls by this onto the floor of its slot, [m]."""
+    """Clearance of the fits, [m]: the distance by which a free part falls onto the floor of its slot."""
     in_last: bool = False
-    """Whether a motion from above that comes between the last walls only half of their way is searched on, and not one
-    that comes half of the way of all."""
+    """How deep a motion from above must come to count as inserted (`stuck`).
+
+    True: half of the way between the last walls. False: half of the way between all walls.
+    """
     squaring: tuple[Grip, ...] = ()
-    """Before it is taken, the fingers close and open again here, at its start; none without probing."""
+    """Grips at the start in which the fingers close and open before the pick; none without probing."""
     flat: Any = None
-    """A `FlatPlacement`: the part laid flat, below where a level insertion begins, or where it stood before one from
-    above; None where it cannot or need not."""
+    """A `FlatPlacement`, at which the part is laid flat before its insertion; None if it is not."""
     side_touches: tuple[Any, ...] = ()
-    """Each a `SideTouch`: where the part touches a wall with its side, before an insertion from above."""
+    """`SideTouch` each: touches of a wall with the side of the part, before an insertion from above."""
     front: Array | None = None
-    """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
-    where a hole is not searched for."""
+    """Foremost point of the moved parts on the way to the goal, in the frame of the part, (3,), [m]; None if the robot
+    does not search for the hole."""
 
     @property
     def begins(self) -> float:
-        """How far before the goal the guarded motion begins, [m]: straight from above, just before it turns slow."""
+        """Distance before the goal at which the guarded motion begins, [m].
+
+        Straight from above this is just before the slow stretch, else the begin of the line.
+        """
         return min(self.into.travel, self.slow + _AHEAD_M) if self.into.direction[2] < -_STRAIGHT else self.into.travel
 
     @property
@@ -130,37 +142,37 @@ class Transfer:
 
     @property
     def depth(self) -> float:
-        """How deep a motion from above goes between walls, [m]."""
+        """Length of a motion from above between walls, [m]."""
         return self.slow - WALL_MARGIN_M
 
     @property
     def stuck(self) -> float:
-        """A motion from above that is stopped farther than this before its end has not found its hole, [m]."""
+        """Distance before its end, [m]; a motion from above that stops farther away has not found its hole."""
         return min(self.entrances) / 2 if self.in_last and self.entrances else self.depth / 2
 
     @property
     def sides(self) -> tuple[Array, ...]:
-        """Directions in which the part is slid onto another one at its side, (3,) each."""
+        """Directions in which the part is slid against others at its sides, (3,) each, world."""
         return tuple(macro.direction for macro in self.macros if macro.name == "slide-to-contact")
 
     @property
     def away(self) -> tuple[Array, ...]:
-        """Directions in which the part is first moved off another one at its side, (3,) each."""
+        """Directions in which the part is moved off others at its sides before it is lifted, (3,) each, world."""
         directions = [macro.direction for macro in self.departs]
         return () if self.out.level else tuple(each for each in directions if abs(each[2]) < 0.5)
 
     @property
     def drawn(self) -> bool:
-        """Whether it is drawn up out of walls while it is lifted."""
+        """Whether the part is drawn up out of walls while it is lifted."""
         return any(macro.direction[2] > 0.5 for macro in self.departs)
 
     @property
     def floats(self) -> float:
-        """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
+        """Height by which a part that was observed on the floor of its slot must rise to be free on all sides, [m]."""
         return 0.5 * self.clearance
 
     def with_tip_at(self, T: Array) -> "Transfer":
-        """The transfer with a tip that comes to be at T, (4, 4), in the frame of where the robot estimates it."""
+        """Return the transfer of a robot whose real tip is at T, (4, 4), in the frame of the estimated tip."""
         if np.array_equal(T, np.eye(4)):
             return self
         grips = tuple(grip.with_tip_at(T) for grip in self.grips)
@@ -169,18 +181,26 @@ class Transfer:
 
 
 def compute_transferred_poses(operation: Operation, target: Array, poses: Poses) -> Poses:
-    """Where all parts are once the main part of an operation was brought to a pose, (4, 4), with what it carries."""
+    """Return the poses of all parts after an operation has moved its main part to `target`, (4, 4).
+
+    The parts that it carries move with it as one rigid body.
+    """
     T = target @ pose.inverse(poses[operation.main])
     return {**poses, **{part: T @ poses[part] for part in operation.moves}}
 
 
 def first_contact_pose(t: Transfer) -> Array:
-    """Where the part first comes down: at its goal, or aside of what it will touch."""
+    """Return the pose of the part, (4, 4), where it first comes down: the goal, or `ASIDE_M` off the sides to touch."""
     return translate(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
 
 
 def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Tip poses that must be in reach for the transfer to be possible: where the part is taken, and where it is put."""
+    """Return the tip poses that must be in reach for a transfer, (4, 4) each.
+
+    Returns:
+        Those at the start (hover, grasp, pulled out if the line is level, above) and those at the goal (above, begin of
+        the line, goal).
+    """
     first = t.grips[0].T_part_tip
     last = t.grips[-1].T_part_tip
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
@@ -193,33 +213,41 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
 
 def is_tilted(T_tip: Array) -> bool:
-    """Whether a tip does not come from above, as near as parts that stand are upright."""
+    """Whether the z axis of a tip is more than 10 degrees off straight down."""
     return bool(T_tip[2, 2] > -_DOWN)
 
 
 def find_hover_pose(grasp: Array) -> Array:
-    """Where the tip comes to a stand before it goes on to a grasp: above it, of a tilted one straight back."""
+    """Return the tip pose at which the hand stops before a grasp, (4, 4): above, or straight back if tilted."""
     if is_tilted(grasp):
         return translate(grasp, grasp[:3, 2], -_HOVER_M)
     return move_to_height(grasp, float(grasp[2, 3]) + _HOVER_M)
 
 
 def plan_arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
-    """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
+    """Return the line on which a part arrives at T; straight down if it has no known contact there."""
     if not arrival.touched:
         return ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
     return ApproachLine(T[:3, :3] @ arrival.line.direction, arrival.line.travel_m)
 
 
 def motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The macros in the world, for a part that arrives at T; slides as they are estimated to be."""
+    """Return the macros of an arrival at T with their directions in the world: first all others, then the slides.
+
+    Args:
+        sides: Directions of the slides, (3,) each, world, from `slide_directions`.
+    """
     straight = [macro for macro in arrival.macros if macro.name != "slide-to-contact"]
     turned = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in straight]
     return (*turned, *(Motion("slide-to-contact", side) for side in sides))
 
 
 def departure_motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The macros backwards, for a part that leaves T: off its sides, the last first, then out of what encloses it."""
+    """Return the motions by which a part leaves T: off its sides in the reverse order, then out of enclosing walls.
+
+    Args:
+        sides: Directions of the slides, (3,) each, world, from `slide_directions`.
+    """
     out = [macro for macro in arrival.departs if macro.length_m is not None]
     drawn = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in out]
     return (*(Motion("depart", -side) for side in reversed(sides)), *drawn)

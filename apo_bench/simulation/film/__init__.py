@@ -1,1 +1,1 @@
-"""Films and viewers of a trial that was kept moment by moment."""
+"""Films and viewers of a trial that was recorded moment by moment."""

@@ -1,4 +1,4 @@
-"""What is written around one picture of a film."""
+"""Add title, captions and an inset to one picture of a film."""
 
 from functools import cache
 from typing import Any, NamedTuple
@@ -8,33 +8,33 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 Picture = NDArray[np.uint8]
-ABOVE_PX = 32
-BELOW_PX = 56
-_EDGE_PX = 10
-_LINE_PX = 22
-_TEXT_PX = 15
+ABOVE_PX = 32  # height of the title
+BELOW_PX = 56  # height of the captions
+_EDGE_PX = 10  # margin at left and right
+_LINE_PX = 22  # distance of lines
+_TEXT_PX = 15  # size of the font
 _PAPER = (250, 250, 248)
 _INK = (30, 30, 32)
 _FAINT = (110, 110, 115)
-_COLORS = {True: (20, 120, 50), False: (180, 30, 25), None: _INK}
+_COLORS = {True: (20, 120, 50), False: (180, 30, 25), None: _INK}  # by `Caption.good`
 
 
 class Caption(NamedTuple):
-    """The words around one picture."""
+    """The text around one picture."""
 
     title: str
     pace: str
-    """How fast it is shown: `real time`, `x 2`."""
+    """Speed of the film, such as `real time`, `x 2`."""
     lines: tuple[str, ...]
-    """Two below the picture at most."""
+    """At most two, below the picture."""
     force: str = ""
-    """Written at the right of the first of them."""
+    """Text at the right of the first line."""
     good: bool | None = None
-    """Colours the lines: a success, a failure, or neither."""
+    """Colour of the lines: success, failure, or (None) neither."""
 
 
 def add_caption(picture: Picture, inset: Picture, caption: Caption) -> Picture:
-    """A picture with a small one in its upper right corner, and words above and below."""
+    """A picture with an inset in its upper right corner, and text above and below."""
     height, width = picture.shape[:2]
     page = Image.new("RGB", (width, height + ABOVE_PX + BELOW_PX), _PAPER)
     page.paste(Image.fromarray(picture), (0, ABOVE_PX))
@@ -51,6 +51,7 @@ def add_caption(picture: Picture, inset: Picture, caption: Caption) -> Picture:
 
 
 def _write(draw: Any, width: int, at: float, left: str, right: str, color: tuple[int, int, int]) -> None:
+    """Write one line with text at the left and at the right; `at` is the height of its middle in pixels."""
     draw.text((_EDGE_PX, at), left, fill=color, font=_font(), anchor="lm")
     draw.text((width - _EDGE_PX, at), right, fill=color, font=_font(), anchor="rm")
 

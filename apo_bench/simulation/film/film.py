@@ -1,7 +1,4 @@
-"""Write a trial as a film with captions.
-
-The large picture shows the parts, the small one the whole table.
-"""
+"""Write a trial as a film with captions: the parts in the large picture, the whole table in the inset."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -20,15 +17,15 @@ from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING
 from apo_bench.simulation.scene import aim_camera, make_initial_state, place_for_picture, save_film
 
-_LETTERS = 86  # in a line of the usual width
-_SIZE = (720, 480)
-_INSET = (192, 128)
-_SPEED = 2.0
+_LETTERS = 86  # in one line of a caption
+_SIZE = (720, 480)  # of the large picture
+_INSET = (192, 128)  # size of the inset
+_SPEED = 2.0  # simulated seconds per second of film
 _PACE = f"x {_SPEED:g}"
-_FPS = 20.0
-_GIF_FPS = 8.0
-_ENDING_S = 2.5  # so long the end of a segment stands still, with what came of it
-_HEADROOM_M = 0.04  # seen above the parts, for what comes down
+_FPS = 20.0  # of MP4
+_GIF_FPS = 8.0  # fewer, for small files
+_ENDING_S = 2.5  # duration of the last picture of a segment, with its outcome
+_HEADROOM_M = 0.04  # visible space above the assembly
 FILM_AZIMUTH_DEG = 128.0
 FILM_ELEVATION_DEG = -24.0
 
@@ -37,10 +34,10 @@ def write_film(assembly: Assembly, assembled: Poses, segments: Sequence[Segment]
     """Write segments one after the other as MP4 or GIF, by the ending of `path`.
 
     Args:
-        assembled: Where the parts are when all is done: the camera looks at them.
+        assembled: Final poses of the parts, for the framing of the camera.
 
     Raises:
-        InputError: Another ending, a place that cannot be written, or there is nothing to draw with.
+        InputError: Another ending, a path that cannot be written, or no graphics driver.
     """
     fps = _GIF_FPS if Path(path).suffix.lower() == ".gif" else _FPS
     timed = frames(assembly, assembled, segments, fps=fps)
@@ -50,10 +47,10 @@ def write_film(assembly: Assembly, assembled: Poses, segments: Sequence[Segment]
 def frames(
     assembly: Assembly, assembled: Poses, segments: Sequence[Segment], fps: float = _FPS
 ) -> Iterator[tuple[Picture, float]]:
-    """The pictures of a film one after the other, and how long each is shown, [s].
+    """The pictures of a film in order, each with its duration, [s].
 
     Args:
-        assembled: Where the parts are when all is done: the camera looks at them.
+        assembled: Final poses of the parts, for the framing of the camera.
     """
     for segment in segments:
         with ExitStack() as stack:
@@ -76,7 +73,12 @@ def frames(
 def _draw(
     segment: Segment, data: Any, moment: FilmMoment, views: Sequence[tuple[Any, Any]], caption: Caption
 ) -> Picture:
-    """A moment as both renderers see it through their cameras, the large one first."""
+    """The picture of one moment with inset and caption.
+
+    Args:
+        data: State of the segment's world, which is set to the moment.
+        views: (renderer, camera) of the large picture and of the inset.
+    """
     data.qpos[:] = moment.qpos
     if len(moment.hands):
         data.mocap_pos[:] = moment.hands
@@ -90,8 +92,13 @@ def _draw(
 
 
 def sample_moments(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
-    """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
-    since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
+    """Moments at intervals of `every_s`, always with the last one, each with its greatest forces.
+
+    A guard stops a motion within one tick, so few sampled moments would show its force.
+
+    Yields:
+        (moment, greatest force since the moment before, greatest force since its operation began), [N].
+    """
     at = -np.inf
     force = 0.0
     most = 0.0
@@ -109,18 +116,18 @@ def sample_moments(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tu
 
 
 def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
-    """`operation 2 of 3, castle2: pick`."""
+    """The operation of a moment in words: `operation 2 of 3, castle2: pick`."""
     k = moment.phase.operation
     if k is None:
         return "the closed hand touches what is fixed" if moment.phase.macro == TOUCHING else "at the start"
     operation = assembly.operations[k]
     carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
-    undone = " undone" * moment.phase.undoes
+    undone = " undone" * moment.phase.undoes  # empty unless true
     return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.phase.macro}"
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
-    """What is done, and the contacts that it makes."""
+    """The caption of a moment: its operation, and the contacts that this makes."""
     words = operation_words(assembly, moment)
     if moment.phase.operation is None:
         return (words,)

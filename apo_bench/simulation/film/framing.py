@@ -1,4 +1,4 @@
-"""What a camera looks at, and from how far, to see parts as large as they fit."""
+"""Choose point and distance of a camera so that parts fill the picture."""
 
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, measure_world_bounds
 
 _NEAREST_M = 0.09
-"""How far the camera stands off: this and the diagonal of what it looks at."""
+"""Distance of the camera, added to the diagonal of the parts' bounding box."""
 
 
 class Framing(NamedTuple):
-    """A point, (3,), world frame, and how far the camera is from it, [m]."""
+    """The point that a camera looks at, (3,), world frame, and its distance from it, [m]."""
 
     look_at: Array
     distance_m: float
@@ -22,11 +22,12 @@ class Framing(NamedTuple):
 def frame_parts(
     assembly: Assembly, states: Sequence[Poses], parts: Collection[str] | None = None, headroom_m: float = 0.0
 ) -> Framing:
-    """See parts in several states.
+    """The framing that shows parts in several states.
 
     Args:
-        parts: None stands for all that are ever moved.
-        headroom_m: What is seen above them.
+        states: Poses of all parts in each state.
+        parts: None: all movable parts.
+        headroom_m: Visible space above the parts.
     """
     shown = assembly.solids.keys() - assembly.fixed if parts is None else parts
     low, high = measure_world_bounds((assembly.solids[part], poses[part]) for poses in states for part in sorted(shown))

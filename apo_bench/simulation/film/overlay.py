@@ -1,4 +1,4 @@
-"""Draw over one moment: poses of parts, hands and names of faces."""
+"""Draw overlays on one moment: parts at other poses, hands, and names of faces."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -12,32 +12,32 @@ from apo_bench.simulation.film.track import FilmMoment, Segment, read_part_poses
 from apo_bench.simulation.scene import Scene, set_part_pose
 
 Color = tuple[float, float, float]
-HAND_M = 0.012
+HAND_M = 0.012  # radius of a hand
 HAND_COLOR = (0.90, 0.70, 0.60)
-OVERLAY_OPACITY = 0.4
-_OFF_M = 0.004  # how far before a flat face its name stands
+OVERLAY_OPACITY = 0.4  # of parts drawn at other poses
+_OFF_M = 0.004  # distance of a name from its flat face
 
 
 class Overlay(NamedTuple):
-    """Parts drawn once more, at their estimated or true poses."""
+    """Poses at which parts are drawn once more, such as estimated or true ones."""
 
     poses: Poses
     color: Color
 
 
 class FilmSnapshot(NamedTuple):
-    """One moment with what is laid over it."""
+    """One moment with its overlays."""
 
     segment: Segment
     moment: FilmMoment
     words: tuple[str, ...]
     faces: tuple[PartFace, ...]
-    """Whose names are written on them."""
+    """Faces whose names are drawn."""
     overlays: tuple[Overlay, ...]
 
 
 def draw_over(scene: Scene, snapshot: FilmSnapshot, drawn: Any) -> None:
-    """Draw into an abstract scene of MuJoCo (`mjvScene`), after what it holds."""
+    """Add the overlays of a snapshot to MuJoCo's abstract scene (`mjvScene`)."""
     for overlay in snapshot.overlays:
         _draw_parts(scene, overlay, drawn)
     for hand in snapshot.moment.hands:
@@ -51,7 +51,7 @@ def draw_over(scene: Scene, snapshot: FilmSnapshot, drawn: Any) -> None:
 
 
 def label_place(scene: Scene, of: PartFace) -> Array:
-    """Where the name of a face stands, (3,), frame of its part, [m]: before its middle, of a round one at its wall."""
+    """The position of a face's name, (3,), part frame, [m]: in front of a flat face, on the wall of a round one."""
     face = scene.scenario.assembly.face_of(of)
     if isinstance(face, Face):
         return np.asarray(face.outline.mean(axis=0) + _OFF_M * face.normal)
@@ -59,22 +59,25 @@ def label_place(scene: Scene, of: PartFace) -> Array:
 
 
 def _draw_parts(scene: Scene, overlay: Overlay, drawn: Any) -> None:
+    """Add the parts of an overlay to the scene."""
     world = scene.work
     data = mujoco.MjData(world.model)
     for part, T in overlay.poses.items():
         if part in world.qpos:
             set_part_pose(world, data, part, T)
     mujoco.mj_kinematics(world.model, data)
-    begin = drawn.ngeom
+    begin = drawn.ngeom  # geoms from here on belong to this overlay
     dynamic = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
     mujoco.mjv_addGeoms(world.model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), dynamic, drawn)
     wanted = {world.free.index(part) for part in overlay.poses if part in world.qpos}
     for geom in drawn.geoms[begin : drawn.ngeom]:
         ours = geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and world.geom_part[geom.objid] in wanted
+        # MuJoCo adds the whole world, so all other geoms become invisible.
         geom.rgba[:] = (*overlay.color, OVERLAY_OPACITY if ours else 0.0)
 
 
 def _geom(drawn: Any, kind: Any, size: float, at: Array, rgba: Sequence[float]) -> Any:
+    """Add a geom to the scene and return it; None if the scene is full."""
     if drawn.ngeom >= drawn.maxgeom:
         return None
     geom = drawn.geoms[drawn.ngeom]

@@ -1,4 +1,4 @@
-"""One moment as coloured shapes, for viewers that know no MuJoCo."""
+"""Convert one moment to coloured shapes, for viewers that do not use MuJoCo."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -12,24 +12,26 @@ from apo_bench.simulation.film.track import show_moment
 from apo_bench.simulation.scene import Scene
 
 _SECTIONS = 32  # around a cylinder
-_DIVISIONS = 2  # how often a ball is divided
-_MOST_GEOMS = 10_000
+_DIVISIONS = 2  # subdivisions of a sphere
+_MOST_GEOMS = 10_000  # of MuJoCo's abstract scene
 
 
 class ShapeKind(NamedTuple):
-    """What a shape looks like, wherever it is."""
+    """The appearance of a shape, without its pose."""
 
     geom: int
-    """A type of MuJoCo."""
+    """Geom type of MuJoCo."""
     size: tuple[float, ...]
+    """As in MuJoCo: half sizes, or radius and half length."""
     mesh: int
+    """Id of the mesh; negative for other types."""
     rgba: tuple[float, ...]
     label: str
-    """What is written instead of a shape; else empty."""
+    """Text in place of a shape; empty for a shape."""
 
 
 class Shape(NamedTuple):
-    """A shape where it is."""
+    """A shape with its pose."""
 
     kind: ShapeKind
     at: Array
@@ -37,7 +39,7 @@ class Shape(NamedTuple):
 
 
 def shapes_of(scene: Scene, data: Any, snapshot: FilmSnapshot) -> Iterator[Shape]:
-    """Everything that is to be seen, planes excepted; `data` is brought to that moment."""
+    """All visible shapes of a snapshot without planes; `data` is set to its moment."""
     model = scene.work.model
     show_moment(scene, data, snapshot.segment, snapshot.moment)
     drawn = mujoco.MjvScene(model, maxgeom=_MOST_GEOMS)
@@ -50,11 +52,12 @@ def shapes_of(scene: Scene, data: Any, snapshot: FilmSnapshot) -> Iterator[Shape
             T = np.eye(4)
             T[:3, :3] = geom.mat
             T[:3, 3] = geom.pos
+            # MuJoCo's `dataid` is twice the id of the mesh
             yield Shape(ShapeKind(geom.type, size, geom.dataid // 2, rgba, geom.label), pose.pack(T))
 
 
 def surface(model: Any, kind: ShapeKind) -> Any:
-    """The triangles of a kind of shape, a `trimesh.Trimesh`; None of what has none."""
+    """The triangles of a kind of shape as `trimesh.Trimesh`; None if it has no surface, such as a label."""
     from trimesh import Trimesh, creation
 
     size = np.array(kind.size)

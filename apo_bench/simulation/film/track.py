@@ -1,4 +1,4 @@
-"""A demonstration or a replay, kept moment by moment."""
+"""Record a demonstration or a replay moment by moment."""
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, final
@@ -11,17 +11,17 @@ from apo_bench.simulation.hooks import Hooks, Phase
 from apo_bench.simulation.scene import Scene, World, make_initial_state, move_arm_home, place_for_picture, set_part_pose
 
 _NO_HANDS = copy_frozen(np.zeros((0, 3)), None, 3)
-_IN_PLACE = "in place"
+_IN_PLACE = "in place"  # phase of a segment that only shows a scenario
 
 
 class FilmMoment(NamedTuple):
-    """A state of a world, and what is done in it."""
+    """One recorded state of a world, with its phase."""
 
     time_s: float
     qpos: Array
     phase: Phase
     hands: Array
-    """Where the hands of the human are, (2, 3), [m]; of a replay (0, 3)."""
+    """Positions of the human hands, (2, 3), world frame, [m]; (0, 3) in a replay."""
 
 
 @final
@@ -32,21 +32,21 @@ class Segment:
     title: str
     world: World
     start: Poses
-    """Before the first moment; what is fixed stays there."""
+    """Poses of all parts before the first moment; fixed parts stay there."""
     moments: tuple[FilmMoment, ...]
     ending: str
-    """What came of it, in a sentence."""
+    """The outcome, in a sentence."""
     good: bool | None
-    """Whether that is a success; None of what has no verdict."""
+    """Whether the outcome is a success; None without a verdict."""
 
 
 @final
 @dataclass(eq=False)
 class FilmTrack:
-    """Keeps a demonstration or a replay: pass its `hooks` as `watch`."""
+    """Records a demonstration or a replay: pass its `hooks` as `watch`."""
 
     plan: Plan | None = None
-    """What is replayed; None of a demonstration."""
+    """The replayed plan; None in a demonstration."""
     moments: list[FilmMoment] = field(default_factory=list)
 
     @property
@@ -61,11 +61,12 @@ class FilmTrack:
 
 
 def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
-    """The nominal assembly of a scenario: the parts before the first operation and after each, a second apart."""
+    """The nominal assembly of a scenario: one moment before the first operation and one after each, 1 s apart."""
     world = scene.work
     data = make_initial_state(world, start)
     moments = list[FilmMoment]()
     move_arm_home(scene, data)
+    # k = -1: before the first operation.
     for k, poses in enumerate((start, *compute_placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
             set_part_pose(world, data, part, poses[part])
@@ -75,13 +76,13 @@ def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
 
 
 def read_part_poses(segment: Segment, moment: FilmMoment) -> Poses:
-    """Where every part is, world frame, [m]."""
+    """The poses of all parts at a moment, world frame, [m]."""
     free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in segment.world.qpos.items()}
     return {**{part: segment.start[part] for part in segment.world.fixed}, **free}
 
 
 def show_moment(scene: Scene, data: Any, segment: Segment, moment: FilmMoment) -> None:
-    """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
+    """Set a state of the replay world to a moment; for a moment of a demonstration the arm is at home."""
     if segment.world is scene.work:
         data.qpos[:] = moment.qpos
     else:

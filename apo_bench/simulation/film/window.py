@@ -1,4 +1,4 @@
-"""MuJoCo's window, in which a trial is stepped through with keys."""
+"""Step through a trial with keys in MuJoCo's window."""
 
 import sys
 import time
@@ -27,14 +27,15 @@ WINDOW_KEYS = {
     268: "faces",
     269: "goals",
 }
-"""What keys mean, by their GLFW codes: letters and digits have a meaning for MuJoCo's window already."""
+"""GLFW code of a key -> its meaning; letters and digits are used by MuJoCo's window already."""
+# Help text in the window: keys, and their meanings line by line.
 _KEYS = "space\nleft, right\nup, down\npage up, page down\nhome\nend"
 _MEANINGS = "play, stop\na moment\nan operation\ndemonstration, replay\nnames of faces\ngoals"
-PICTURE_S = 1.0 / 30.0
+PICTURE_S = 1.0 / 30.0  # pause between pictures
 
 
 def no_window() -> str:
-    """Why no window can be opened here, empty where one can."""
+    """The reason why no window can be opened here; empty if one can."""
     try:
         need_window()
     except InputError as error:
@@ -53,13 +54,13 @@ def step_in_window(
     press: Callable[[str], None],
     pass_time: Callable[[float], None],
 ) -> None:
-    """Open the window and show snapshots until a person closes it.
+    """Open the window and show snapshots until it is closed.
 
     Args:
-        assembled: What the camera looks at.
-        now: The snapshot to show.
-        press: Called with what a key means, one of `WINDOW_KEYS`.
-        pass_time: Called with how many seconds have passed.
+        assembled: Final poses of the parts, for the framing of the camera.
+        now: Returns the snapshot to show.
+        press: Called with the meaning of a pressed key, one of the values of `WINDOW_KEYS`.
+        pass_time: Called with the seconds that have passed.
     """
     import mujoco.viewer
 
@@ -90,6 +91,7 @@ def step_in_window(
 
 
 def _draw(scene: Scene, data: Any, snapshot: FilmSnapshot, window: Any) -> None:
+    """Show a snapshot with its overlays and texts."""
     show_moment(scene, data, snapshot.segment, snapshot.moment)
     window.user_scn.ngeom = 0
     draw_over(scene, snapshot, window.user_scn)

@@ -1,1 +1,1 @@
-"""The hands of the human who demonstrates."""
+"""Simulate the human who demonstrates: two hands that carry out each operation."""

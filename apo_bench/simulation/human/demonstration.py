@@ -1,4 +1,4 @@
-"""Simulate the demonstration of a human, and read the poses when each part rests."""
+"""Simulate the demonstration of a human, and read the pose of each part once it rests."""
 
 from collections.abc import Callable
 from typing import Any
@@ -77,7 +77,11 @@ def demonstrate(
 
 
 def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) -> list[Snapshot]:
-    """Do all operations; what stands where after each, and when all is done."""
+    """Carry out all operations.
+
+    Returns:
+        A snapshot after each operation, and one at the end.
+    """
     scenario = scene.scenario
     stages = (layout.start, *compute_placements(scenario.assembly, layout.start, layout.poses))
     after = []
@@ -86,6 +90,7 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
         for k in range(len(scenario.assembly)):
             hands.begin(k)
             target = layout.poses[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
+            # Displaced parts are corrected at the last operation.
             late = error.left if k == len(scenario.assembly) - 1 else ()
             perform(hands, plan_hand_operation(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
             after.append(take_snapshot(scene.shown, hands.data, layout.start))
@@ -95,7 +100,10 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
 
 
 def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) -> Array:
-    """The offset of the operation with the human error, (3,) [m], in the part's own frame."""
+    """The displacement of the operation with the human error, (3,), [m], in the frame of its part.
+
+    The same random numbers are drawn whatever `how` and `human_error` are.
+    """
     sign = rng.choice([-1.0, 1.0])
     size = rng.uniform(0.0, 1.0)
     if how is None:
@@ -104,7 +112,10 @@ def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) 
 
 
 def _wrong(scene: Scene, layout: Layout, after: list[Snapshot]) -> str:
-    """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
+    """The fault of a demonstration in words; empty if it is right.
+
+    Parts pushed by late corrections are no fault.
+    """
     reached = ReachedState(after=tuple(after[:-1]), final=after[-1])
     demonstrated = judge(scene.scenario.assembly, reached, layout.poses, scene.criteria).demonstrated
     fault = next((fault for fault, there in demonstrated.conditions.items() if there and fault != "pushed"), None)

@@ -1,4 +1,4 @@
-"""One operation as the hands do it, from the scenario."""
+"""Plan one operation for the hands of the human, from the scenario."""
 
 from dataclasses import dataclass
 from typing import final
@@ -15,35 +15,36 @@ from apo_bench.scenario import (
 )
 
 _SIDE_M = 0.002
-"""A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
+"""Distance to the sides of a part while it is lowered before a slide, or lifted after one."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class HandOperation:
-    """One operation as the hands do it; poses and directions in the world, [m]."""
+    """One operation for the hands; poses and directions in the world frame, [m]."""
 
     part: str
     carries: tuple[str, ...]
     target: Array
-    """(4, 4), of the part."""
+    """(4, 4): goal of the part, with the human error."""
     direction: Array
     """Unit vector of the last motion, (3,)."""
     travel: float
+    """Length of the last motion."""
     out: Array
-    """(3,), the first motion: away from what the part lies against or sticks in; zero: straight up."""
+    """(3,), the first motion, out of walls or off sides; zero: the part is lifted at once."""
     aside: Array
-    """(3,), how far beside its target it comes down; zero if it comes to lie against nothing."""
+    """(3,), offset from the target at which the part is lowered; zero if no slide follows."""
     true: Poses
-    """Where every part should be when all is done."""
+    """True poses of all parts after the operation."""
     bearing: tuple[str, ...]
     """The moved parts that make contacts."""
     over: float
-    """How high the part must be lifted so that what moves passes over what stands, [m]."""
+    """Height of the part's frame at which the moved parts pass over all others, [m]."""
     drags: bool
-    """Whether it comes level, over a floor to which it has no play."""
+    """Whether the part is inserted level, over a floor without play."""
     late: tuple[str, ...]
-    """Parts that are displaced and now brought to their true places by the other hand."""
+    """Displaced parts that the other hand now moves to their true poses."""
 
     @property
     def from_above(self) -> bool:
@@ -53,11 +54,11 @@ class HandOperation:
 def plan_hand_operation(
     scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], late: tuple[str, ...]
 ) -> HandOperation:
-    """Operation k for the hands.
+    """Plan operation k for the hands.
 
     Args:
-        target: (4, 4), where the hands put the main part, right or wrong.
-        stages: Where every part should be before the first operation and after each.
+        target: (4, 4), goal of the main part, with the human error.
+        stages: True poses of all parts before the first operation and after each.
         late: Displaced parts that the other hand corrects.
     """
     assembly = scenario.assembly
@@ -84,7 +85,7 @@ def plan_hand_operation(
 
 
 def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
-    """The motion, (3,) [m], that frees what moves: back out of where it sticks, or off what is beside."""
+    """The first motion, (3,), [m], that frees the moved parts: back out of a level insertion, or off the sides."""
     direction = poses[before.main][:3, :3] @ before.line.direction
     if before.touched and abs(direction[2]) < 0.5:
         return np.asarray(-before.line.travel_m * direction)
@@ -92,5 +93,5 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
 
 
 def _off(sides: tuple[Array, ...]) -> Array:
-    """Away from all of them, (3,); zero if there is none."""
+    """The sum of the opposite directions of `sides`, (3,); zero if there are none."""
     return -np.sum(np.array(sides).reshape(-1, 3), axis=0)

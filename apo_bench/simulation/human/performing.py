@@ -1,4 +1,4 @@
-"""Carry out one operation by two hands."""
+"""Carry out one planned operation with two hands."""
 
 import numpy as np
 
@@ -25,16 +25,17 @@ _NUDGE = 0.01
 _SAFE_M = 0.16
 """Least height at which parts are carried over the others."""
 _DROP_M = 0.0002
-"""A part is let go this much above its support, as a hand does not press it into the table."""
+"""Height above the support at which a part is released, since a hand does not press it down."""
 _LIFT_M = 0.0003
-"""How far a part is lifted while it is adjusted, so that it does not drag the one below."""
+"""Lift of a part during an adjustment, so that it does not drag the one below."""
 STAND_STILL_S = 0.3
+"""Wait after an operation, until everything rests."""
 _SETTLE_S = 0.15
-"""A group trails behind a quick hand by a millimetre; so long it takes to catch up."""
+"""Wait until a group has caught up with a quick hand, which it lags by a millimetre."""
 
 
 def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
-    """Carry it out, and wait until everything rests."""
+    """Carry out an operation, and wait until everything rests."""
     T = hands.grab(0, operation.part)
     for part in operation.carries:
         hands.add(0, part)
@@ -57,7 +58,10 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
 
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
-    """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
+    """Move the held part from T by `out`, level, and return the pose at the end.
+
+    The part is first raised by the clearance, off the floor of a hole, which would be dragged along.
+    """
     raised = translate(T, UP, clearance_m)
     hands.move((0, smooth_trajectory(T, raised, _NUDGE)))
     hands.move((0, smooth_trajectory(raised, translate(raised, out, 1.0), _STROKE)))
@@ -65,9 +69,9 @@ def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
 
 
 def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) -> tuple[Array, Array, Array]:
-    """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go.
+    """The poses of the last motion: its beginning, its end beside the goal, and the goal, where the part is released.
 
-    Over a floor without play the part is held up by half the clearance, as friction would hold it back.
+    Over a floor without play the part is raised by half the clearance, to avoid friction.
     """
     goal = target = translate(operation.target, UP, clearance_m / 2) if operation.drags else operation.target
     if operation.from_above:
@@ -77,13 +81,16 @@ def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) 
 
 
 def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
-    """How much higher a group must end than planned, as it hangs in the hand, so that nothing ends too deep, [m]."""
+    """The height that a group must end higher than planned because it hangs tilted in the hand, [m].
+
+    No part that makes a contact then ends too deep.
+    """
     motion = operation.target @ pose.inverse(T)
     return max(float(operation.true[part][2, 3] - (motion @ hands.pose(part))[2, 3]) for part in operation.bearing)
 
 
 def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
-    """The last motion; the other hand adjusts what is displaced on the way, the last of it while the part arrives."""
+    """Move the main part along `stroke` to its place; the other hand corrects displaced parts, the last meanwhile."""
     standing = [part for part in operation.late if part not in operation.carries]
     for part in standing[:-1]:
         _adjust(hands, part, operation.true[part], _LIFT_M, ())
@@ -98,7 +105,7 @@ def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
 
 
 def _shift_carried(hands: Hands, operation: HandOperation, part: str, clearance_m: float) -> None:
-    """Shift a part of the group to its true place beside the main part; lowered, so that it does not rub."""
+    """Move a carried part to its true pose relative to the main part, lowered, so that it does not rub."""
     there = hands.pose(operation.part) @ pose.inverse(operation.true[operation.part]) @ operation.true[part]
     _adjust(hands, part, there, -clearance_m, (), held=True)
     hands.wait(0.05)
@@ -109,7 +116,12 @@ def _shift_carried(hands: Hands, operation: HandOperation, part: str, clearance_
 def _adjust(
     hands: Hands, part: str, true: Array, lift: float, meanwhile: tuple[tuple[int, Trajectory], ...], held: bool = False
 ) -> None:
-    """Lift, shift and lower a part to its true place at the height where it is; the hand then still holds it."""
+    """Lift a part by `lift` [m], move it to its true pose at its present height, and lower it; hand 1 keeps holding it.
+
+    Args:
+        meanwhile: Motions of the other hand during the shift.
+        held: Hand 0 holds the part before and releases it.
+    """
     here = hands.grab(1, part)
     if held:
         hands.let_go(0, part)
@@ -120,7 +132,7 @@ def _adjust(
 
 
 def _first(stroke: Trajectory, fraction: float) -> Trajectory:
-    """The first part of a stroke, as a motion."""
+    """The first share of a stroke, in half of its time, as a motion of its own that stops at the end."""
     return Trajectory(
         stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, interpolate_minimum_jerk
     )

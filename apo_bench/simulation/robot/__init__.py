@@ -1,4 +1,4 @@
-"""The arm in motion: it follows lines and measures contact forces."""
+"""The simulated robot: its motions along lines, its force sensors, its gripper and its errors."""
 
 from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, servo, zero
 from apo_bench.simulation.robot.forces import Guard, LowPass

@@ -1,6 +1,6 @@
-"""Motions that depend on force: on the part in the hand, or by the sensor at the wrist.
+"""Force-controlled motions: servoing on the force on the held part, pressing and complying by the wrist sensor.
 
-Nothing is left out while the sensor reads: these motions are simulated in full at either fidelity.
+While the wrist sensor reads, every physics step is simulated, at either fidelity.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,25 +17,26 @@ from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_loa
 from apo_bench.simulation.scene import switch_wrist_sensors_on
 
 ZERO_S = 0.5
-"""So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
+"""Duration of zeroing: the mean of 500 readings has 0.045 times the noise of one."""
 _SETTLE_S = 0.06
-"""A low pass has forgotten its first reading but for 0.25 % then."""
-_FAR_M = 0.0005  # shifted farther than this, how the joints turn is computed again
-_FAR_RAD = 0.0025  # or turned by more than this
+"""Time after which 0.25 % of the first reading is left in the low pass."""
+_FAR_M = 0.0005  # shift of the hand after which `comply` computes the Jacobian again
+_FAR_RAD = 0.0025  # turn of the hand after which `comply` computes the Jacobian again
 
 
 def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
-    """Shift the tip a little, step by step, by the force on the part in the hand.
+    """Shift the tip, physics step by physics step, by a control law on the contact force on the held part.
 
     Args:
-        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip moves off
-            where it began, (3,) world, [m], or None to end.
+        law: Called with the force, (3,), world, [N], before each step. Returns the displacement of the tip from where
+            it began, (3,), world, [m], or None to end.
 
     Raises:
         ExecutionAborted: Something went wrong on the way.
     """
     q = robot.q
     offset = np.zeros(3)
+    # The displacement is small, so one Jacobian maps it to the joints: (joints, 3), per metre along world axes.
     turns = robot.scene.kinematics.inverse_jacobian(q)[:, :3] @ robot.T[:3, :3].T
     force: Sequence[float] = robot.forces.net()
     passed = 0
@@ -48,7 +49,12 @@ def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
 
 
 def get_wrist(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
-    """The sensor of a robot, by the name of its noise.
+    """Return a new wrist sensor of a robot.
+
+    Args:
+        name: Name of its noise, or its standard deviations, as in `parse_ft_noise`.
+        rng: Source of its offset and noise.
+        bandwidth_hz: Cutoff frequency of its low pass.
 
     Raises:
         InputError: An unknown name, or a number that is not allowed.
@@ -58,7 +64,10 @@ def get_wrist(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: f
 
 @contextmanager
 def read_wrist(robot: Robot, wrist: WristSensor) -> Iterator[None]:
-    """The wrist reads at every step, and guards of motions are its; what the robot does here stands still at first."""
+    """Within this context the wrist sensor reads every step, and guards act on its force, at full fidelity.
+
+    The robot stands still at first until the low pass has settled. Nested contexts of the same sensor do nothing.
+    """
     if robot.wrist is wrist:
         yield
         return
@@ -74,7 +83,7 @@ def read_wrist(robot: Robot, wrist: WristSensor) -> Iterator[None]:
 
 
 def zero(robot: Robot, wrist: WristSensor) -> None:
-    """Stand still in free air; what the sensor shows on average, but for the known weights, is nothing from now on.
+    """Tare the wrist sensor while the arm stands still in free air.
 
     Raises:
         ExecutionAborted: Something went wrong meanwhile.
@@ -87,35 +96,35 @@ def zero(robot: Robot, wrist: WristSensor) -> None:
 
 
 def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist: WristSensor) -> float | None:
-    """Follow a line until the filtered force against `way` passes `newton`, and stop there at once.
+    """Follow a line until the filtered force against `direction` exceeds `newton`, and stop there at once.
 
-    The arm goes on while the sensor lags behind by its time constant. At 2 mm/s the blow of a first touch stays below
-    the limit of 20 N of a collision, with half the time step too, and the tip stops within 0.03 mm of where it touched;
-    at 4 mm/s with the usual step only, at 10 mm/s not. `newton` should be 5 times `wrist.sigma` at least, or noise
-    stops it.
+    The arm moves on while the sensor lags behind by its time constant. At 2 mm/s the impact of a first touch stays
+    below the collision limit of 20 N, also with half the time step. The tip then stops within 0.03 mm of the touch. At
+    4 mm/s this holds with the usual step only, at 10 mm/s not at all.
 
     Args:
         direction: The direction of pressing, a unit vector, (3,), world.
+        newton: The force limit, [N]; at least 5 times `wrist.sigma[0]`, or noise stops the motion.
 
     Returns:
-        What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
-        its end, and nothing was met.
+        What is left of the line, [m], with the robot where its encoders say (`robot.T`). None if the robot followed it
+        to its end without contact.
 
     Raises:
         ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
     """
     with read_wrist(robot, wrist):
-        return robot.follow(line, Guard(direction, newton)) or None
+        return robot.follow(line, Guard(direction, newton)) or None  # 0.0: the guard did not stop it
 
 
 def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
-    """Move the hand a little, reading by reading, by the wrench: `servo` in six directions.
+    """Move the hand, reading by reading, by a control law on the wrench: `servo` in six degrees of freedom.
 
     Args:
-        law: Called at each reading (`READING_S`) with the filtered wrench, (6,), [N] and [Nm], world, about the point
-            where it is then; returns how far the hand moves off where it began, (6,): the shift of the point, [m],
-            and a rotation vector about it, [rad], world; or None to end.
-        about: The point, (3,), world, [m]; it moves with the hand.
+        law: Called at each reading (`READING_S`) with the filtered wrench about the present reference point, (6,), [N]
+            and [Nm], world. Returns the displacement of the hand from where it began, (6,), or None to end: the shift
+            of the point, [m], and a rotation vector about it, [rad], world.
+        about: The reference point at the beginning, (3,), world, [m]; it moves with the hand.
 
     Raises:
         ExecutionAborted: Something went wrong on the way.
@@ -130,7 +139,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
             q = q + J @ (wanted - offset)
             offset = np.array(wanted)
             taken = False
-            while not taken:
+            while not taken:  # physics steps until the next reading is complete
                 passed += 1
                 robot.servo_step(q, passed)
                 taken = wrist.take(robot.step_s)
@@ -143,7 +152,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
 
 
 def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
-    """How the joints turn, (joints, 6), with the shift of a point, [m], and a turn about it, [rad], world."""
+    """Return the matrix, (joints, 6), from shift of a point, [m], and turn about it, [rad], world, to joint angles."""
     T = robot.scene.kinematics.forward(q)
     # The tip turns with the point and moves by the shift plus w x (tip - point); both in the frame of the tip.
     R = T[:3, :3].T

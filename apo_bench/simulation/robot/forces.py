@@ -1,4 +1,4 @@
-"""The contact forces that a robot reads."""
+"""The contact force on the held part and on the arm, read from MuJoCo's contact sensors."""
 
 import math
 from collections.abc import Sequence
@@ -10,22 +10,29 @@ from apo_bench.geometry import Array
 from apo_bench.simulation.scene import World
 
 WRIST_S = 0.02
-"""Time constant of the sensor at the wrist (8 Hz). Where hard parts touch, the force of a single step nearly doubles
-when the step is halved, while its impulse stays; behind the filter it hardly depends on the step. Real sensors of force
-are read behind filters of 5 to 70 Hz for the same reason."""
+"""Time constant of the force filter (8 Hz).
+
+When hard parts touch, halving the physics step nearly doubles the force of a single step, but its impulse stays. The
+filtered force hardly depends on the step. Real force sensors have filters of 5 to 70 Hz for the same reason.
+"""
 _COLLISION_N = 20.0
-"""An arm that strikes a part it does not hold harder than this has made a protective stop."""
+"""Contact force on the arm above which it makes a protective stop, unless it handles the part."""
 
 
 class LowPass:
-    """A first-order filter, y' = (x - y) / time constant. Plain numbers, since arrays this small are slow."""
+    """A first-order low pass of a force, dy/dt = (x - y) / time constant; plain floats, since small arrays are slow."""
 
     def __init__(self, time_constant_s: float) -> None:
         self._time_constant_s = time_constant_s
         self.force = [0.0, 0.0, 0.0]
 
     def __call__(self, force: Sequence[float], seconds: float) -> list[float]:
-        """The filtered force, (3,), [N], after one that lasted so long, at most the time constant."""
+        """Filter a force that acted for some time; return the filtered force, (3,), [N].
+
+        Args:
+            force: Mean force during this time, (3,), [N].
+            seconds: Duration, at most the time constant, or the filter overshoots.
+        """
         part = seconds / self._time_constant_s
         x, y, z = self.force
         fx, fy, fz = force
@@ -34,40 +41,46 @@ class LowPass:
 
 
 class Guard(NamedTuple):
-    """Stop when the held part is pushed back along `way` by more than `newton`."""
+    """A force limit: the motion stops when the held part is pushed against `direction` by more than `newton`."""
 
     direction: Array
+    """Unit vector of the motion, (3,), world."""
     newton: float
+    """Limit of the force, [N]."""
 
 
 class ForceSensors:
     """The contact sensors of a scene, as the robot reads them.
 
-    The scene has, first for each movable part, what the part exerts on all that it touches; then, for each part, what
-    it exerts on the arm; three numbers each. The sensors of the wrist, which come last, are none of them.
+    Order of `sensordata`, three numbers each, world, [N]: first, for each movable part, the force that it exerts on all
+    that it touches. Then, for each movable and each fixed part, the force that it exerts on the arm. The sensors of the
+    wrist come last and are not read here.
     """
 
     def __init__(self, work: World, sensordata: Array) -> None:
+        """Take a view of `MjData.sensordata`, so each physics step updates it."""
         self._free = work.free
         self._names = (*work.free, *work.fixed)
         contacts = sensordata[: 3 * (len(work.free) + len(self._names))]
         self.sensors = contacts
-        """The contact sensors as the last step left them."""
+        """The contact sensors after the last physics step: a view of `sensordata`."""
         self._on_arm_flat = contacts[3 * len(work.free) :]
         self._on_arm = self._on_arm_flat.reshape(-1, 3)
-        self._net_of_sensors = np.zeros((3, len(contacts)))
-        self._handled: int | None = None
+        self._net_of_sensors = np.zeros((3, len(contacts)))  # contact sensors -> net force on the held parts
+        self._handled: int | None = None  # index of the part that the fingers may touch
         self.held: tuple[str, ...] = ()
+        """The held part, then the parts that it carries."""
         self.wrist = LowPass(WRIST_S)
+        """The filtered net force on the held parts."""
         self.peak_n = 0.0
-        """The largest that the sensor at the wrist has shown."""
+        """The largest magnitude of the filtered force so far, [N]."""
 
     def hold(self, *parts: str) -> None:
-        """Set which parts are in the hand: the held one and what it carries, or none."""
+        """Set the parts in the hand: the held one, then those that it carries; none for an empty hand."""
         self.held = parts
         self.wrist = LowPass(WRIST_S)
-        # The force on a part is that of its own sensor, the other way round, less what the arm exerts on it; what the
-        # parts of a group exert on each other cancels in the sum over the group.
+        # Force on a part = -(its own sensor) - (force of the arm on it), and the latter is -(force of it on the arm).
+        # Forces between the parts of a group cancel in the sum over the group.
         self._net_of_sensors = np.zeros_like(self._net_of_sensors)
         for i in map(self._free.index, parts):
             on_arm = 3 * (len(self._free) + i)
@@ -75,30 +88,38 @@ class ForceSensors:
             self._net_of_sensors[:, 3 * i : 3 * i + 3] -= np.eye(3)
 
     def handle(self, part: str | None) -> None:
-        """Set which part the fingers may touch."""
+        """Set the part that the fingers may touch without a collision; None: no part."""
         self._handled = None if part is None else self._free.index(part)
 
     def net(self) -> list[float]:
-        """The net force of everything but the gripper on what is in the hand, (3,) world, [N]."""
+        """Return the net contact force on the held parts, except that of the gripper, (3,), world, [N]."""
         net: list[float] = np.dot(self._net_of_sensors, self.sensors).tolist()
         return net
 
     def push(self, guard: Guard) -> Array:
-        """What the sensors are multiplied by for the force against a guard."""
+        """Return the weights, (sensors,), whose dot product with `sensors` is the force against a guard, [N]."""
         return np.asarray(-guard.direction @ self._net_of_sensors)
 
     def take(self, sensors: Array, step_s: float) -> None:
-        """Let the sensor at the wrist take up the sensors of some steps, (k, sensors)."""
+        """Filter the net force of some physics steps and update the peak.
+
+        Args:
+            sensors: Contact sensors after each step, (k, sensors).
+            step_s: Length of a step, [s].
+        """
         for force in (sensors @ self._net_of_sensors.T).tolist():
             self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
 
     def load(self) -> float:
-        """The weight on the gripper, [N]: of the held part and of what really hangs on it."""
-        return -float(self._on_arm[:, 2].sum())
+        """Return the weight on the gripper, [N]: of the held part and of everything that really hangs on it."""
+        return -float(self._on_arm[:, 2].sum())  # vertical forces; parts push the arm down
 
     def struck(self) -> str | None:
-        """The part that the arm strikes too hard without handling it."""
-        if self._on_arm_flat @ self._on_arm_flat <= _COLLISION_N**2:
+        """Return the part with which the arm collides harder than `_COLLISION_N`, None if there is none.
+
+        The part that is handled does not count.
+        """
+        if self._on_arm_flat @ self._on_arm_flat <= _COLLISION_N**2:  # quick test: all forces together are too small
             return None
         squares = (self._on_arm * self._on_arm).sum(axis=1)
         if self._handled is not None:
@@ -107,11 +128,11 @@ class ForceSensors:
         return self._names[hardest] if math.sqrt(squares[hardest]) > _COLLISION_N else None
 
     def memory(self) -> tuple[Any, ...]:
-        """What is remembered from step to step, for `remember`."""
+        """Return the state that is kept between steps, for `remember`."""
         return self.held, self._handled, self.wrist.force, self.peak_n
 
     def remember(self, memory: tuple[Any, ...]) -> None:
-        """Go on from where a `memory` was made."""
+        """Restore the state that `memory` returned."""
         held, self._handled, force, self.peak_n = memory
         self.hold(*held)
         self.wrist.force = force

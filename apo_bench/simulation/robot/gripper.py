@@ -1,6 +1,6 @@
-"""The gripper of a scene: the room that it takes, its fingers and their commands.
+"""The gripper of a scene: its shape as boxes, and how its fingers are measured and commanded.
 
-Openings are of each finger, [m].
+An opening is always that of each finger, half the distance between the pads, [m].
 """
 
 import math
@@ -17,15 +17,15 @@ from apo_bench.simulation.arms.shapes import below
 from apo_bench.simulation.frames import frame
 
 _UPRIGHT_M = 0.001
-"""Room above and below: supports are where they are known to be."""
+"""Largest margin along the tip's axis; small, since the height of supports is known well."""
 STUCK_M = 0.002
-"""Fingers that open do not rest while they are so far from their command: they stick to a part, or start late."""
+"""Opening fingers farther than this from their command have not arrived: they stick to a part, or start late."""
 _LONGEST_S = 0.2
-"""How long fingers of a stiff drive may take to rest behind their command."""
+"""Time that fingers of a stiff drive may take to rest after their command has arrived."""
 
 
 def open_hand(kinematics: Kinematics, opening: float) -> tuple[Any, Array]:
-    """The arm alone with its hand at an opening, as `MjData`, and the tip there, (4, 4)."""
+    """Return the `MjData` of the arm alone with its fingers at an opening, and the pose of the tip in it, (4, 4)."""
     arm = kinematics.arm
     model = kinematics.model
     data = mujoco.MjData(model)
@@ -39,10 +39,10 @@ def open_hand(kinematics: Kinematics, opening: float) -> tuple[Any, Array]:
 
 @lru_cache(maxsize=64)
 def list_gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
-    """The geoms of the gripper that can touch something, in the frame of the tip, each as the box around it.
+    """Return the bounding boxes, along the axes of the tip, of all geoms of the gripper that can touch something.
 
     Args:
-        margin: Added on every level side, [m]; above and below, `_UPRIGHT_M` is.
+        margin: Added on both sides of each box across the axis of the tip, [m]; along it `_UPRIGHT_M` at most.
     """
     model = kinematics.model
     data, T_tip = open_hand(kinematics, opening)
@@ -61,44 +61,44 @@ def list_gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0
 
 
 class SlideFingers:
-    """Slide joints that are zero when closed, and one position actuator."""
+    """Fingers on slide joints that are zero when closed, with one position actuator for all."""
 
     def __init__(self, model: Any, arm: Arm) -> None:
         self._grip = model.actuator(f"arm/{arm.grip}").id
         limit = model.actuator_forcerange[self._grip, 1]
         stiffness = model.actuator_gainprm[self._grip, 0]
         self.slack = float(limit / stiffness) if model.actuator_forcelimited[self._grip] else math.inf
-        """So far from where it stands a command pushes with all force, [m]."""
+        """Distance between command and opening at which the drive reaches its force limit, [m]."""
         self.longest_s = _LONGEST_S
-        """How long the fingers may take to rest behind their command."""
+        """Time that the fingers may take to rest after their command has arrived, [s]."""
         joints = [model.joint(f"arm/{name}").id for name in arm.fingers]
         self._dof = model.jnt_dofadr[joints]
         self._qpos = model.jnt_qposadr[joints]
 
     def opening(self, data: Any) -> float:
-        """What the fingers measure."""
+        """Return the measured opening: that of the finger that is less open."""
         return float(data.qpos[self._qpos].min())
 
     def speed(self, data: Any) -> float:
-        """How fast the fastest finger moves, [m/s]."""
+        """Return the speed of the faster finger, [m/s]."""
         return float(np.abs(data.qvel[self._dof]).max())
 
     def command(self, data: Any, opening: float) -> None:
-        """Have them go there, or push with what force they have."""
+        """Command an opening; fingers that cannot reach it push with their force."""
         data.ctrl[self._grip] = opening
 
     def commanded(self, data: Any) -> float:
-        """The opening that they are commanded to."""
+        """Return the commanded opening."""
         return float(data.ctrl[self._grip])
 
     def put(self, data: Any, opening: float) -> None:
-        """Bring them there at once, with their command."""
+        """Set opening and command at once, without simulation."""
         data.qpos[self._qpos] = opening
         self.command(data, opening)
 
 
 class MeasuredFingers:
-    """Any fingers, by what was measured of them; methods as in `SlideFingers`."""
+    """Fingers of any mechanism, by the measured relation of opening, joints and commands; methods as `SlideFingers`."""
 
     def __init__(self, model: Any, hand: Hand, tip: str) -> None:
         self.hand = hand
@@ -117,6 +117,7 @@ class MeasuredFingers:
 
     def opening(self, data: Any) -> float:
         left, right = data.geom_xpos[self._pads]
+        # Elements 0, 3 and 6 of the tip's rotation matrix are its x axis, along which the fingers close.
         return (abs(float((left - right) @ data.site_xmat[self._tip][::3])) - self.hand.thick_m) / 2
 
     def speed(self, data: Any) -> float:
@@ -135,5 +136,5 @@ class MeasuredFingers:
 
 
 def fingers_of(model: Any, arm: Arm) -> SlideFingers | MeasuredFingers:
-    """The fingers of an arm in a scene."""
+    """Return the fingers of an arm: by measurement if the arm has a `hand` description, else slide joints."""
     return SlideFingers(model, arm) if arm.hand is None else MeasuredFingers(model, arm.hand, arm.tip)

@@ -1,12 +1,13 @@
-"""Move what is in the hand: keep it there on its way, take it along at once, weld it.
+"""Set the poses of held parts in the simulation: free of creep, moved along with the hand, or welded to it.
 
-What is carried freely stays where it is in the hand. A contact of MuJoCo solves J a = -b J v, where J v is the speed
-of one side past the other. The acceleration of one side past the other is J a + dJ/dt v, and dJ/dt v is not zero where
-contacts move along an arc. So the pads take a carried part along with an error of some |dJ/dt v| / b, 1 mm/s: it creeps
-by 0.1 to 1.1 mm until it is above its goal. With dJ/dt v taken off the right side, step by step, 0.77 mm became 0.03 at
-best and 0.41 became 0.18 at worst; that would cost more than it is worth here.
-Friction, the force and stiffness of the fingers and the softness of friction change it by at most 0.04 mm. Half the
-speed halves it; so does half the time constant of the pads, with which parts that are off slip in.
+`hold_steady` removes an artefact of the contact model. A contact of MuJoCo solves J a = -b J v, where J v is the
+relative velocity of both sides. Their relative acceleration is J a + dJ/dt v, and dJ/dt v is not zero where contacts
+move along an arc. So the pads carry a part with a velocity error of some |dJ/dt v| / b, 1 mm/s: the part creeps by 0.1
+to 1.1 mm until it is above its goal. Subtracting dJ/dt v on the right side at each step reduced 0.77 mm to 0.03 at
+best, and 0.41 to 0.18 at worst. This does not justify its cost.
+
+Friction, the force and stiffness of the fingers and the softness of friction change the creep by at most 0.04 mm. Half
+the speed halves it. Half the time constant of the pads does too, but then misplaced parts slip into place.
 """
 
 from collections.abc import Callable
@@ -19,33 +20,38 @@ from apo_bench.simulation.frames import body_frame, quaternion
 from apo_bench.simulation.scene import Scene, World, get_part_pose, set_part_pose, touches_others
 
 SLIPS_M = 5e-5
-"""What moves farther in the hand in a tick does not creep: it slips."""
+"""Displacement in the hand within a tick above which a part slips, and is not put back."""
 TINY_S = 1e-4
-"""Speeds of the tip are differences over this time."""
+"""Time step of the finite differences that give the velocity of the tip."""
 
 
 class Carried(NamedTuple):
-    """What is in the hand on a way through the air."""
+    """The parts in the hand during a motion through the air."""
 
     parts: tuple[str, ...]
     """The part that the fingers hold, then those that it carries."""
     T_tip_part: Array | None = None
-    """Where the first part is kept in the hand, (4, 4); None while it is not carried freely."""
+    """Pose of the first part in the frame of the tip that is kept, (4, 4); None while a part touches other things."""
 
 
 def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -> Carried:
-    """Put what is carried back where it was in the hand a tick ago, as one rigid body; speeds stay.
+    """Undo the creep of one tick: move the carried parts back to their pose in the hand; return the new state.
 
-    Nothing is put back while any of it touches anything but the hand, and what slips in earnest is left to slip.
+    The parts move as one rigid body and keep their velocities. Nothing is moved while one of them touches anything but
+    the hand, or when they slipped by more than `SLIPS_M`.
+
+    Args:
+        T_world_tip: The present pose of the tip, (4, 4).
+        carried: The state after the last tick.
     """
     if touches_others(world, data, carried.parts):
         return carried._replace(T_tip_part=None)
     now = get_part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
         wanted = T_world_tip @ carried.T_tip_part
-        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:
+        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:  # creep; else the new pose is kept from now on
             shift = wanted @ pose.inverse(now)
-            velocity = np.array(data.qvel)
+            velocity = np.array(data.qvel)  # `set_part_pose` stops a part
             for part in carried.parts:
                 set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
             data.qvel[:] = velocity
@@ -62,13 +68,14 @@ def fast_forward(
     velocity: Array,
     held: tuple[str, ...],
 ) -> None:
-    """Bring the arm somewhere else at once, and what it holds as it lies in the hand: nothing is near on the way.
+    """Move the arm and the held parts at once, without simulation, along a stretch where nothing is near.
 
     Args:
         forward: Joint angles -> pose of the tip, (4, 4).
         joints: Addresses of the arm's joints in `qpos` and in `qvel`.
-        by: (joints,), how far each joint goes, [rad].
-        velocity: (joints,), how fast it is then, [rad/s].
+        by: Displacement of each joint, (joints,), [rad].
+        velocity: Joint velocities afterwards, (joints,), [rad/s].
+        held: The parts in the hand, which keep their poses in it.
     """
     at, dof = joints
     before = forward(data.qpos[at])
@@ -81,7 +88,11 @@ def fast_forward(
 
 
 def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Array, Array, Array]) -> None:
-    """Move parts as one rigid body with a frame, (4, 4): where it is, where it goes, and where `TINY_S` later."""
+    """Move parts as one rigid body with a frame, and give them the velocity of this frame.
+
+    Args:
+        frames: Poses of the frame, (4, 4), world: before the move, after it, and `TINY_S` later.
+    """
     before, after, later = frames
     way = after @ pose.inverse(before)
     # Velocity of the frame by differences; R(later) R(after)^T is 1 + hat(spin) TINY_S to first order, so the spin is
@@ -99,11 +110,12 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
 
 
 def weld(scene: Scene, data: Any, part: str, on: bool) -> None:
-    """The ideal gripper: hold a part exactly as it now is, or let go."""
+    """Switch the weld of an ideal gripper: hold a part in its present pose in the hand, or release it."""
     model = scene.work.model
     weld = model.equality(f"grasp_{part}").id
     if on:
         mount = body_frame(data, model.body(f"arm/{scene.arm.mount}").id)
         T = pose.inverse(mount) @ body_frame(data, model.body(f"{part}/").id)
+        # MuJoCo's data of a weld: anchor (3), relative position (3), quaternion (4), torque scale (1).
         model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *quaternion(T), 1)
     data.eq_active[weld] = int(on)

@@ -1,8 +1,8 @@
-"""Find the stretches of a motion on which the hand, or what it holds, is near anything else.
+"""Find the stretches of a motion on which the hand, or the parts in it, come near anything else.
 
-The hands that demonstrate use it, and the robot only with the fidelity `near-contact`. It reads the state of the
-simulation, as the physics does; no command of the robot depends on it. Boxes that a separating axis
-keeps apart by less than `NEAR_HELD_M` are near, which is never too few.
+Only these stretches are simulated in demonstrations and with the fidelity `near-contact`. The search reads the state of
+the simulation; no command of the robot depends on it. Distances are along separating axes, which never exceed the true
+distance, so no near stretch is missed.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,20 +18,21 @@ from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene import Scene, World, get_part_pose
 
 NEAR_HELD_M = (0.00005, 0.00015)
-"""A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
-_PLACES = 100  # places checked along a line
-_APART_M = (0.0002, 0.001)  # not closer together than the first, nor farther apart than the second
+"""Distances that count as near: for a single held part, and for a group, whose parts may shift. The drift in the hand
+during a motion is smaller."""
+_PLACES = 100  # places checked along a line, if their spacing is within `_APART_M`
+_APART_M = (0.0002, 0.001)  # least and greatest spacing of the checked places
 _RUN_UP_S = 0.04
-"""A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
+"""Time simulated before a motion comes near: an arm that starts in motion needs this to catch up."""
 _SHORTEST_S = 0.05
-"""Less than this is not worth leaving out."""
-_STILL_M_S = 1e-3  # while a part that is not held moves faster, nothing is left out
-_STILL_RAD_S = 2e-2  # or turns faster
-_UPRIGHT = 1e-6
+"""Least time between two stretches that is skipped."""
+_STILL_M_S = 1e-3  # if a part that is not held moves faster, nothing is skipped
+_STILL_RAD_S = 2e-2  # if a part that is not held turns faster, nothing is skipped
+_UPRIGHT = 1e-6  # [rad]: a motion that turns by less is a translation
 
 _Flags = NDArray[np.bool_]
 _Span = tuple[int, int]
-"""The first and the last of the points of a line that are simulated."""
+"""First and last index, inclusive, of the points of a line that are simulated."""
 
 
 class Obstacle(NamedTuple):
@@ -39,27 +40,37 @@ class Obstacle(NamedTuple):
 
     pieces: tuple[Piece, ...]
     T: Array
+    """Pose of the part, (4, 4), world."""
     low: Array
-    """The lowest corner of the upright box around it, (3,), world, [m]."""
+    """Lowest corner of the bounding box along world axes, (3,), [m]."""
     high: Array
+    """Highest corner of this box, (3,), [m]."""
 
 
 def make_obstacle(pieces: tuple[Piece, ...], T: Array) -> Obstacle:
-    """A part that rests at T."""
+    """Return a part at rest at T, (4, 4), world, with its bounding box."""
     return Obstacle(pieces, T, *measure_upright_bounds(pieces, T[:3, :3], T[:3, 3]))
 
 
 class MovingPieces(NamedTuple):
-    """Pieces that move with the tip, in their own frame."""
+    """Convex pieces that move with the tip."""
 
     pieces: tuple[Piece, ...]
+    """In their own frame."""
     T_tip: Array
+    """Pose of this frame in that of the tip, (4, 4)."""
 
 
 def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[MovingPieces]:
-    """The gripper at an opening [m], and the parts that it holds, as they move with the tip."""
+    """Return everything that moves with the tip: first the gripper at an opening of each finger, [m], then each held part.
+
+    Args:
+        T_tip: Present pose of the tip, (4, 4), world.
+        held: The held parts, at their present poses in the simulation.
+    """
     inverse = pose.inverse(T_tip)
     parts = [MovingPieces(scene.pieces[part], inverse @ get_part_pose(scene.work, data, part)) for part in held]
+    # Rounded, so that the cache of `list_gripper_boxes` is hit.
     return [MovingPieces(list_gripper_boxes(scene.kinematics, round(opening, 4)), np.eye(4)), *parts]
 
 
@@ -74,15 +85,17 @@ def find_near_spans(
     run_up_s: float = _RUN_UP_S,
     near_m: tuple[float, float] = NEAR_HELD_M,
 ) -> list[_Span]:
-    """The stretches of a line along which something comes near, each with its run-up.
+    """Return the stretches of a line on which something comes near, each with its run-up, as indices into `s`.
+
+    If a part that is not held moves, the whole line is one stretch.
 
     Args:
-        moving: The hand and what it holds.
-        held: Which parts move with the tip.
-        s: (n + 1,), how far along the line the tip is at each step, from 0 to 1.
-        world: Where it moves, by default where the robot works.
-        run_up_s: A motion is simulated from so long before it comes near.
-        near_m: How near, for a single part and for a group, [m].
+        moving: The hand and the held parts.
+        held: Names of the parts that move with the tip.
+        s: Progress of the tip along the line at each step, (n + 1,), from 0 to 1.
+        world: The world of the motion; by default that of the robot.
+        run_up_s: Time simulated before the motion comes near.
+        near_m: Distances that count as near, for a single part and for a group, [m].
     """
     n = len(s) - 1
     world = world or scene.work
@@ -90,22 +103,28 @@ def find_near_spans(
     if not _still(world, data, others):
         return [(0, n)]
     obstacles = [make_obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
+    # Indices of the steps that are checked, about evenly spaced along the line, and the last one.
     places = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
-    near = _near(moving, obstacles, line, s[places], near_m[len(held) > 1])
+    near = _near(moving, obstacles, line, s[places], near_m[len(held) > 1])  # index 1: of a group
     return _spans(near, places, n, run_up_s, float(scene.physics.timestep_s))
 
 
 def clear(scene: Scene, data: Any, moving: Iterable[MovingPieces], T: Array) -> bool:
     """Whether nothing is near the empty hand while the tip stands at T."""
+    # A line of length zero, checked at its one place.
     return not find_near_spans(scene, data, moving, (), Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
 
 
 def _near(
     moving: Iterable[MovingPieces], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float
 ) -> _Flags:
-    """(k,), at which places along the line something is near.
+    """Return at which places along the line something is nearer than the margin, (k,).
 
-    What turns is taken as the box around all that it sweeps, and nothing else is checked.
+    On a line that turns, the box around everything that the moving pieces sweep is checked instead of the pieces.
+
+    Args:
+        s: Progress along the line at the k places.
+        margin: [m].
     """
     # Upright boxes first: only where the box around what moves meets the box around what rests are pieces compared.
     R = line.start[:3, :3]
@@ -121,7 +140,7 @@ def _near(
         low = tips + (low - margin)
         high = tips + (high + margin)
         may: _Flags = np.all((low[:, None] < bounds[:, 1]) & (high[:, None] > bounds[:, 0]), axis=-1)
-        if turns:
+        if turns:  # the bounding box of the sweep decides
             near |= may.any(axis=1)
             continue
         for i in map(int, np.flatnonzero(may.any(axis=0))):
@@ -135,17 +154,17 @@ def _near(
 
 
 def _apart(far: float) -> float:
-    """How far apart the checked places are along a line of this length, [m], as a part of it."""
+    """Return the spacing of the checked places along a line of this length, [m], as a fraction of the length."""
     least, most = _APART_M
     return min(max(far / _PLACES, least), most) / max(far, least)
 
 
 def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
-    """The corners of an upright box around what an upright box sweeps while it turns about the origin.
+    """Return the corners of a box along world axes around everything that such a box sweeps as it turns.
 
     Args:
-        turn: (3,), the rotation vector, world, [rad]. Without its level part everything turns about the vertical; with
-            it nothing is further from there than that part times how far it is from the origin.
+        low, high: Corners of the box relative to the centre of rotation, (3,), [m].
+        turn: The rotation vector, (3,), world, [rad].
     """
     # Turned about an axis that is off the vertical by a level part w, a point at r moves up or out by |w| |r| at most;
     # about the vertical it stays within its distance from the axis.
@@ -156,11 +175,20 @@ def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
 
 
 def _spans(near: _Flags, places: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:
-    """Stretches that are near, begun earlier by the run-up, as one where little lies between."""
+    """Join places that are near to stretches, begun earlier by the run-up.
+
+    Stretches, or a stretch and an end of the line, are joined if less than `_SHORTEST_S` lies between.
+
+    Args:
+        near: For each checked place, (k,).
+        places: Indices of these places along the line, (k,).
+        n: Last index of the line.
+    """
     run_up = round(run_up_s / step_s)
     shortest = round(_SHORTEST_S / step_s)
     spans: list[_Span] = []
     for i in map(int, np.flatnonzero(near)):
+        # From the place before to the place after, since something may be near between two places.
         begin = int(places[max(i - 1, 0)]) - run_up
         end = int(places[min(i + 1, len(places) - 1)])
         begin = 0 if begin < shortest else begin
@@ -173,10 +201,12 @@ def _spans(near: _Flags, places: Ints, n: int, run_up_s: float, step_s: float) -
 
 
 def _still(world: World, data: Any, parts: Iterable[str]) -> bool:
+    """Whether all movable ones of these parts are at rest."""
     starts = [world.dof[part] for part in parts if part in world.dof]
     speeds = np.abs(np.array([data.qvel[v : v + 6] for v in starts]).reshape(-1, 6))
     return not len(speeds) or bool(speeds[:, :3].max() < _STILL_M_S and speeds[:, 3:].max() < _STILL_RAD_S)
 
 
 def _pose(world: World, data: Any, part: str) -> Array:
+    """Return the pose of a movable or fixed part, (4, 4), world."""
     return get_part_pose(world, data, part) if part in world.dof else body_frame(data, world.body[part])

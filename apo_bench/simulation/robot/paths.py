@@ -1,4 +1,4 @@
-"""Straight lines in space and time: where the tip is when."""
+"""Straight-line trajectories of the tip, with smooth, steady and paced timing, and waypoints for the wrist."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,29 +12,32 @@ from apo_bench.geometry import Array, pose
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
 _SHORTEST_S = 0.15
-"""No smooth motion is shorter."""
+"""Least duration of a smooth motion."""
 _RAMP_S = 0.1
-"""How long a steady motion gains and loses speed."""
-_GAIN = 0.6  # [m/s^2]: how fast a paced motion gains and loses speed
-_CELL_M = 2e-5  # its speed is found in cells of this length
+"""Duration of the acceleration, and of the deceleration, of a steady motion."""
+_GAIN = 0.6  # acceleration and deceleration of a paced motion, [m/s^2]
+_CELL_M = 2e-5  # spacing at which the speed of a paced motion is computed
 _STRAIGHT = 1e-8
-"""Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
+"""A rotation matrix this near to the identity has its antisymmetric part as rotation vector, which saves time."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """From one pose to another: position along a straight line, orientation about one fixed axis."""
+    """A motion of the tip between two poses: position along a straight line, rotation about one fixed axis."""
 
     start: Array
+    """Pose, (4, 4), world."""
     end: Array
+    """Pose, (4, 4), world."""
     seconds: float
+    """Duration."""
     progress: Callable[[Array], Array]
-    """Time / seconds in [0, 1] -> part of the way in [0, 1]."""
+    """Time / seconds in [0, 1] -> fraction of the way in [0, 1]."""
 
     @property
     def length(self) -> float:
-        """How far the position goes, [m]."""
+        """Length of the straight line, [m]."""
         return distance(self.start, self.end)
 
     @cached_property
@@ -43,7 +46,7 @@ class Trajectory:
         return _turn_between(self.start, self.end)
 
     def poses(self, s: Array) -> Array:
-        """(k,) parts of the way -> (k, 4, 4)."""
+        """Return the poses, (k, 4, 4), at fractions of the way, (k,)."""
         T = np.zeros((len(s), 4, 4))
         turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
         T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
@@ -53,19 +56,19 @@ class Trajectory:
 
 
 def distance(start: Array, end: Array) -> float:
-    """Between the positions of two poses, [m]."""
+    """Return the distance between the positions of two poses, [m]."""
     return float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
 
 
 def smooth_trajectory(start: Array, end: Array, speed: float, turn_speed: float = 1.5) -> Trajectory:
-    """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
+    """Return a minimum-jerk trajectory, at rest at both ends, with bounded peak speeds [m/s] and [rad/s]."""
     turn = float(np.linalg.norm(_turn_between(start, end)))
     seconds = max(_SHORTEST_S, _PEAK * distance(start, end) / speed, _PEAK * turn / turn_speed)
     return Trajectory(start, end, seconds, interpolate_minimum_jerk)
 
 
 def plan_steady_trajectory(start: Array, end: Array, speed: float) -> Trajectory:
-    """Constant speed [m/s] with a short ramp at both ends, for motions that a guard may stop."""
+    """Return a trajectory of constant speed [m/s] with a short ramp at both ends, for motions that a guard may stop."""
     seconds = max(distance(start, end) / speed + _RAMP_S, 2.0 * _RAMP_S)
     return Trajectory(start, end, seconds, _Trapezoid(_RAMP_S / seconds))
 
@@ -73,7 +76,13 @@ def plan_steady_trajectory(start: Array, end: Array, speed: float) -> Trajectory
 def plan_paced_trajectory(
     start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]
 ) -> Trajectory:
-    """As `steady`, at one speed [m/s] along some stretches, from and to so far from the start, [m], else at another."""
+    """Return a trajectory with bounded acceleration that is slow along some stretches.
+
+    Args:
+        quick: Speed outside of the stretches, [m/s].
+        slow: Speed along them, [m/s].
+        stretches: Begin and end of each, as distances from the start, [m].
+    """
     far = distance(start, end)
     x = np.linspace(0.0, far, max(2, round(far / _CELL_M)) + 1)
     limit = np.full(len(x), quick)
@@ -93,20 +102,22 @@ def plan_paced_trajectory(
 
 
 def interpolate_minimum_jerk(t: Array) -> Array:
-    """10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan, 1985)."""
+    """Return the progress 10 t^3 - 15 t^4 + 6 t^5 at times t in [0, 1] (Flash and Hogan, 1985)."""
     return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
 
 
 @final
 @dataclass(frozen=True)
 class _Trapezoid:
-    """Constant speed between two linear ramps, each this part of the whole time."""
+    """Progress at constant speed between two linear ramps of the speed."""
 
     ramp: float
+    """Duration of each ramp as a fraction of the whole time."""
 
     def __call__(self, t: Array) -> Array:
         r = self.ramp
-        top = 1.0 - self.ramp
+        top = 1.0 - self.ramp  # begin of the second ramp, and the area under the trapezoid of height 1
+        # The integral of this trapezoid: parabola, line, parabola.
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
 
@@ -114,7 +125,7 @@ class _Trapezoid:
 @final
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """Progress by what is known of some times."""
+    """Progress by linear interpolation between fractions of the way, `parts`, at fractions of the time, `times`."""
 
     times: Array
     parts: Array
@@ -124,7 +135,7 @@ class _Table:
 
 
 def _turn_between(start: Array, end: Array) -> Array:
-    """The rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
+    """Return the rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
     R = start[:3, :3].T @ end[:3, :3]
     if np.abs(R - np.eye(3)).max() < _STRAIGHT:
         return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
@@ -134,17 +145,17 @@ def _turn_between(start: Array, end: Array) -> Array:
 
 
 def measure_turn(rest: Array, T: Array) -> float:
-    """How far a tip that looks down is turned about the vertical from its rest, -pi to pi, [rad]."""
-    a = rest[:2, 0]
+    """Return the turn about the vertical from the pose `rest` of a tip that looks down to T, -pi to pi, [rad]."""
+    a = rest[:2, 0]  # level part of the tip's x axis
     b = T[:2, 0]
     return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
 def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
-    """Where to go through from start to end so that a wrist which began at rest does not wind up.
+    """Return the waypoints from start to end, the end included, on which the wrist does not wind up.
 
-    The shorter way round may lead over a half turn away from the rest, where the wrist ends; then the other way is
-    taken, with a pose in the middle.
+    The shorter turn may pass a half turn away from `rest`, where the range of the wrist ends. Then the tip turns the
+    other way, by a waypoint in the middle.
     """
     a = measure_turn(rest, start)
     b = measure_turn(rest, end)
@@ -154,13 +165,17 @@ def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...
 
 
 def waypoints_around(base: Array, rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
-    """Where to go through so that the tip keeps away from where the base stands, (3,), world, [m].
+    """Return one waypoint on a circle around the base of the arm, and the end.
 
-    It passes on the side where it is at rest, as far from the base as the farther of both ends.
+    The tip passes the base on the side of its pose `rest`, as far from the base as the farther of both ends.
+
+    Args:
+        base: Position of the base, (3,), world, [m].
     """
     front = rest[:2, 3] - base[:2]
 
     def angle(T: Array) -> float:
+        """Angle about the base from the direction of `rest` to the tip at T, [rad]."""
         x, y = T[:2, 3] - base[:2]
         return float(np.arctan2(front[0] * y - front[1] * x, front @ (x, y)))
 
@@ -171,7 +186,7 @@ def waypoints_around(base: Array, rest: Array, start: Array, end: Array) -> tupl
 
 
 def _halfway(start: Array, at: Array, turn: float) -> Array:
-    """A pose at a place, (3,), turned from the start about the vertical by half of a turn, [rad]."""
+    """Return a pose at a position, (3,), with the orientation of `start` turned about the vertical by `turn / 2`."""
     c, s = np.cos(turn / 2), np.sin(turn / 2)
     T = np.array(start)
     T[:3, 3] = at
@@ -180,14 +195,14 @@ def _halfway(start: Array, at: Array, turn: float) -> Array:
 
 
 def translate(T: Array, along: Array, by: float) -> Array:
-    """The pose shifted in the world."""
+    """Return the pose shifted by `by`, [m], times a vector in the world, (3,)."""
     out = np.array(T)
     out[:3, 3] += by * np.asarray(along)
     return out
 
 
 def move_to_height(T: Array, height: float) -> Array:
-    """The pose lifted or lowered to a height in the world, [m]."""
+    """Return the pose lifted or lowered to a height in the world, [m]."""
     out = np.array(T)
     out[2, 3] = height
     return out

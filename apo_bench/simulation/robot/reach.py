@@ -1,4 +1,4 @@
-"""Joint angles along a line: inverse kinematics at knots, a cubic spline through them."""
+"""Joint angles along a straight line of the tip: inverse kinematics at knots, and a cubic spline through them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,34 +12,34 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import Trajectory, smooth_trajectory, waypoints_around, waypoints_unwound
 
-_KNOT_M = 0.03  # inverse kinematics is solved at least this densely along a line
-_KNOT_RAD = 0.15  # and along a turn
-_SHORT_M = 0.01  # so short a line has one knot in its middle, any other two at least
-_SHORT_RAD = 0.05  # as `_SHORT_M`, of a turn
+_KNOT_M = 0.03  # greatest spacing of knots along a line
+_KNOT_RAD = 0.15  # greatest spacing of knots in the turn
+_SHORT_M = 0.01  # a line up to this length has one inner knot, a longer one two at least
+_SHORT_RAD = 0.05  # as `_SHORT_M`, for the turn
 _SPEED_TIMES = 101
-"""Times at which the speed of the joints is checked."""
+"""Number of times at which the joint speeds are checked."""
 _CREEP_RAD_S = 2e-3
-"""Dry friction is full above some such."""
-_FAR_M = 0.3  # spacing of knots where only the end counts
-_FAR_RAD = 1.0  # as `_FAR_M`, of a turn
+"""Joint speed above which dry friction is nearly full."""
+_FAR_M = 0.3  # spacing of knots where only the end of a line counts
+_FAR_RAD = 1.0  # as `_FAR_M`, for the turn
 
 
 class Knots(NamedTuple):
-    """Joint angles that inverse kinematics found at places along a line."""
+    """Joint angles from inverse kinematics at places along a line."""
 
     s: Array
-    """(k,), from 0 to 1."""
+    """Fractions of the line, (k,), from 0 to 1."""
     q: Array
-    """(k, joints), [rad]."""
+    """Joint angles there, (k, joints), [rad]."""
 
 
 def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: Knots | None = None) -> Array | None:
-    """Joint angles, (k, joints), at places along a line; None where the arm does not reach.
+    """Return the joint angles at places along a line, (k, joints), or None if a place is out of reach.
 
     Args:
-        s: (k,), in ascending order, from 0 to 1.
-        q: (joints,), at the first of the places, [rad].
-        known: From `limit_speed`, of a line that begins at `q`; solved again only where other knots are needed.
+        s: Fractions of the line, (k,), in ascending order, from 0 to 1.
+        q: Joint angles at the first of these places, (joints,), [rad].
+        known: Knots from `limit_speed` of a line that begins at `q`, used if they are at the needed places.
     """
     if len(s) == 1:
         return np.asarray(q)[None]
@@ -52,8 +52,15 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
 
 
 def solve_end_angles(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
-    """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
-    for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):
+    """Return the joint angles at one place of a line, (joints,), or None if it is out of reach.
+
+    They are solved by way of a few knots, and if that fails by many.
+
+    Args:
+        begin, end: Fractions of the line, from 0 to 1.
+        q: Joint angles at `begin`, (joints,), [rad].
+    """
+    for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):  # few knots first, since they take less time
         knots = _knots(
             kinematics,
             line,
@@ -66,10 +73,10 @@ def solve_end_angles(kinematics: Kinematics, line: Trajectory, begin: float, end
 
 
 def plan_waypoints(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Array) -> tuple[Array, ...]:
-    """Where to go through in the air from T, where the joints are q, to another pose.
+    """Return the waypoints through the air from T, where the joint angles are q, to another pose, this included.
 
-    Straight, unless only a way around where the base stands is in reach, which short arms have in their way. The usual
-    arm has room.
+    The way is straight, unless only one around the base of the arm is in reach. The default arm (without `hand`) has
+    room, and always takes the straight way.
     """
     rest = kinematics.forward(arm.home)
     straight = waypoints_unwound(rest, T, end)
@@ -80,7 +87,13 @@ def plan_waypoints(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Ar
 
 
 def follow_waypoints(kinematics: Kinematics, T: Array, way: Sequence[Array], q: Array) -> Array | None:
-    """Where the joints end that lead the tip along straight lines from T, where they are q; None out of reach."""
+    """Return the joint angles at the end of straight lines through waypoints, (joints,), None if out of reach.
+
+    Args:
+        T: Pose of the tip at the beginning, (4, 4).
+        way: The waypoints, (4, 4) each.
+        q: Joint angles at T, (joints,), [rad].
+    """
     for to in way:
         path = along(kinematics, smooth_trajectory(T, to, 1.0), np.array([0.0, 1.0]), q)
         if path is None:
@@ -90,11 +103,13 @@ def follow_waypoints(kinematics: Kinematics, T: Array, way: Sequence[Array], q: 
 
 
 def feedforward_command(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
-    """The commands of position servos with which the joints are on a path, (n, joints), at velocities, [rad/s].
+    """Return the commands of position servos, (n, joints), with which the joints follow a path without lag.
 
     Args:
-        lead: (joints,), damping over gain, [s].
-        stick: (joints,), dry friction over gain, [rad].
+        path: Joint angles, (n, joints), [rad].
+        velocity: Joint velocities, (n, joints), [rad/s].
+        lead: Damping over gain of each servo, (joints,), [s].
+        stick: Dry friction over gain of each servo, (joints,), [rad].
     """
     return np.asarray(path + (lead * velocity + stick * np.tanh(velocity / _CREEP_RAD_S)))
 
@@ -102,11 +117,15 @@ def feedforward_command(path: Array, velocity: Array, lead: Array, stick: Array)
 def limit_speed(
     kinematics: Kinematics, line: Trajectory, q: Array, limit: Array | None
 ) -> tuple[Trajectory, Knots | None]:
-    """The same line, slower where a joint would turn faster than it can; and the knots that were solved for that.
+    """Slow a line down as a whole so that no joint exceeds its speed limit.
 
     Args:
-        q: (joints,), where the line begins, [rad].
-        limit: (joints,), the speed limits, [rad/s]; None: there are none, and nothing is solved.
+        q: Joint angles at the beginning of the line, (joints,), [rad].
+        limit: The speed limits, (joints,), [rad/s]; None: no limits.
+
+    Returns:
+        The line, and the knots that were solved for the check. Without limits, or out of reach, the line stays as it is
+        and the knots are None.
     """
     if limit is None:
         return line, None
@@ -123,12 +142,15 @@ def limit_speed(
 
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
-    """How many steps of these lengths, [m] and [rad], a line takes."""
+    """Return how many steps a line takes if none is longer than `far`, [m], or turns more than `turn`, [rad]."""
     return max(line.length / far, float(np.linalg.norm(line.turn)) / turn)
 
 
 def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:
-    """Each is looked for from where the two before it lead, so that the arm does not leap to another way to stand."""
+    """Solve inverse kinematics at fractions s of a line, the first being at q; None if a place is out of reach.
+
+    Each solution starts from the linear extrapolation of the two before, so that the arm keeps its configuration.
+    """
     path = [np.asarray(q)]
     for i, T in enumerate(line.poses(s[1:])):
         reached = kinematics.inverse(T, 2 * path[-1] - path[-2] if i else path[-1])

@@ -1,10 +1,11 @@
-"""The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
+"""The controller of the arm: it follows lines with feedforward, stops at guards, and aborts on failures.
 
-Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
-`servo_step`, for motions of which each depends on the force in the step before. The robot knows what it commanded,
-its joint and finger positions and the force on the part in its hand: no command depends on where a part is. The
-simulation alone reads or sets poses of parts: `_look` and `slip` shift them in the hand, `in_hand` records that, and
-`follow` and `fingers` leave out steps while nothing is near (fidelity `near-contact`). One class: these share steps.
+Every physics step of a replay is taken in one of two methods. `_tick` takes those of `follow`, `wait` and `fingers`;
+`servo_step` takes those of motions that depend on the force after each step.
+
+The robot knows its commands, its joint and finger positions and the force on the held part; no command depends on the
+true pose of a part. Only the simulation reads or sets these: `_look` and `slip` shift parts in the hand, `in_hand`
+records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
 """
 
 import math
@@ -37,8 +38,8 @@ from apo_bench.simulation.scene import (
     use_timestep,
 )
 
-_REST_RAD_S = 2e-3  # joints that move slower rest
-_REST_M_S = 3e-3  # fingers that move slower rest
+_REST_RAD_S = 2e-3  # joint speed below which the arm is at rest
+_REST_M_S = 3e-3  # finger speed below which the fingers are at rest
 
 
 class ExecutionAborted(Exception):
@@ -47,8 +48,8 @@ class ExecutionAborted(Exception):
     Attributes:
         stage: What the robot did: `pick`, `carry`, `attach` and so on.
         code: What went wrong, a failure code.
-        part: Which part it is about, if not the one that is moved.
-        why: What is known of the cause.
+        part: The part concerned; empty if it is the moved one.
+        why: A phrase about the likely cause; empty if it is unknown.
     """
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
@@ -60,7 +61,7 @@ class ExecutionAborted(Exception):
 
 
 class Robot:
-    """One arm during one replay."""
+    """The controller of one arm during one replay, with the simulation that it moves in."""
 
     def __init__(
         self,
@@ -70,6 +71,14 @@ class Robot:
         fidelity: str = "full",
         error: RobotError | None = None,
     ) -> None:
+        """Put the arm at home, its fingers open, and the parts at their true start poses.
+
+        Args:
+            start: Pose of each part, (4, 4), world.
+            watch: Hooks, or a function called with the `MjData` at each tick.
+            fidelity: `full` or `near-contact`.
+            error: The errors of the robot, which its controller does not know.
+        """
         self.scene = scene
         self.arm = scene.arm
         self.model = scene.work.model
@@ -79,12 +88,13 @@ class Robot:
         self.step: Step | None = None
         self.slip_monitor = GraspSlipMonitor()
         self.left_out_s = 0.0
-        """How much of the time passed without being simulated."""
+        """Time skipped without simulation so far, [s]."""
         self.wrist: WristSensor | None = None
-        """Reads every step and stops guarded motions, while it is on (`by_wrist`)."""
+        """The sensor that reads every step and stops guarded motions; None while it is off (`read_wrist`)."""
         self._error = error
+        # True minus measured joint angles.
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
-        # What is near is looked for where the tip is estimated, so with joints that are off nothing is left out.
+        # The search for near parts uses the estimated tip, so with joint errors no step is skipped.
         self.fidelity = "full" if self._off.any() else fidelity
         self._carried: Carried | None = None
         model = self.model
@@ -92,13 +102,14 @@ class Robot:
         self._qpos = model.jnt_qposadr[joints]
         self._dof = model.jnt_dofadr[joints]
         self._drives = np.array([model.actuator(f"arm/{name}").id for name in self.arm.joints])
-        # A position servo pushes with gain (u - q) - damping dq, so at a constant speed it lags behind its command by
-        # damping / gain times the speed: so much is the command ahead of the path; for dry friction by friction / gain.
+        # A position servo pushes with gain (u - q) - damping dq. At constant speed it lags behind its command by
+        # damping / gain times the speed, and by friction / gain for dry friction. The command leads the path by both.
         damping = model.dof_damping[self._dof] - model.actuator_biasprm[self._drives, 2]
         self._lead = damping / model.actuator_gainprm[self._drives, 0]
         self._stick = model.dof_frictionloss[self._dof] / model.actuator_gainprm[self._drives, 0]
         self.step_s = float(model.opt.timestep)
         self._steps_of_tick = max(1, round(TICK_S / self.step_s))
+        # Commanded joint angles, and the tip pose to which they lead without errors.
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
         self._rest = self.T
@@ -114,7 +125,7 @@ class Robot:
 
     @contextmanager
     def watch_stability(self) -> Iterator[None]:
-        """Abort, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
+        """Within this context, abort with `unstable_simulation` if a diverged simulation raises an error."""
         try:
             yield
         except (mujoco.FatalError, ArithmeticError, ValueError) as error:
@@ -123,12 +134,16 @@ class Robot:
             raise
 
     def follow(self, line: Trajectory, guard: Guard | None = None) -> float:
-        """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
+        """Move the tip along a line; return how much of it is left, [m]: 0 unless the guard stopped the motion.
+
+        Args:
+            line: From the present commanded pose `T`.
+            guard: Force limit at which the arm stops; None: no limit.
 
         Raises:
             ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
         """
-        if np.abs(line.start - line.end).max() < 1e-7:
+        if np.abs(line.start - line.end).max() < 1e-7:  # nothing to do
             return 0.0
         kinematics = self.scene.kinematics
         line, knots = limit_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
@@ -137,7 +152,7 @@ class Robot:
         done = 0
         for begin, end in self._spans(line, s):
             q = self.q
-            if begin > done:
+            if begin > done:  # nothing is near before this stretch: skip to its begin
                 q = self.reached(solve_end_angles(kinematics, line, s[done], s[begin], q))
             path = self.reached(along(kinematics, line, s[begin : end + 1], q, knots))
             velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
@@ -147,7 +162,7 @@ class Robot:
                 fast_forward(work, self.data, kinematics.forward, joints, q - self.q, velocity[0], self.forces.held)
                 self._pass((begin - done) * self.step_s)
             if self._run(feedforward_command(path, velocity, self._lead, self._stick)[1:], guard) < end - begin:
-                # The measured joint positions become the command, which takes the pressure away.
+                # The guard stopped it: the measured joint angles become the command, which takes the pressure away.
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
                 self.stand(0.06)
@@ -158,18 +173,25 @@ class Robot:
         return 0.0
 
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
-        """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
+        """Move the tip smoothly through the air to a pose, by waypoints on which the wrist does not wind up.
+
+        Args:
+            end: Pose of the tip, (4, 4).
+            speed, turn_speed: Peak speeds, [m/s] and [rad/s].
+        """
         for T in plan_waypoints(self.scene.kinematics, self.arm, self.T, end, self.q):
             self.follow(smooth_trajectory(self.T, T, speed, turn_speed))
 
     def servo_step(self, q: Array, passed: int = 1, velocity: Array | None = None) -> list[float]:
-        """Take one physics step towards joint angles, [rad], with a velocity, [rad/s], fed forward.
+        """Take one physics step with commanded joint angles.
 
         Args:
-            passed: How many steps have passed: after each tick the robot checks its state.
+            q: Joint angles, (joints,), [rad].
+            passed: Number of this step, from 1; the robot checks its state after each full tick.
+            velocity: Joint velocities for the feedforward, (joints,), [rad/s]; None: no feedforward.
 
         Returns:
-            The force on the part in the hand, (3,) world, [N].
+            The contact force on the held part, (3,), world, [N].
         """
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
         self.data.ctrl[self._drives] = to + self._off
@@ -180,7 +202,11 @@ class Robot:
         return self.forces.net()
 
     def wait(self, seconds: float, parts: int = 1) -> None:
-        """Stand still; each physics step may be taken in so many parts."""
+        """Stand still for some time.
+
+        Args:
+            parts: Number of shorter steps into which each physics step is divided.
+        """
         command = self._commands(self.q[None])
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._steps_of_tick):
@@ -191,14 +217,18 @@ class Robot:
                 self._look()
 
     def stand(self, most_s: float = 0.1) -> None:
-        """Stand still until the joints and the fingers rest, at most so long, [s]."""
+        """Stand still until the joints and the fingers rest, or for `most_s`."""
         for _ in range(round(most_s / TICK_S)):
             self.wait(TICK_S)
             if self._rests():
                 return
 
     def fingers(self, to: float) -> None:
-        """Command both fingers to an opening [m] until they rest; beyond the part's surface the force limit rules."""
+        """Move both fingers to an opening, [m], and wait until they rest; a part between them limits the motion.
+
+        The command moves at the speed limit of the fingers. If it lies inside a part, the fingers press with at most
+        their force limit.
+        """
         fingers = self._fingers
         # Begin at the command nearest to `to` at which the fingers push as they do now: their force is limited.
         opening = self.opening()
@@ -213,43 +243,44 @@ class Robot:
         for i in range(1, ticks + round(fingers.longest_s / TICK_S)):
             fingers.command(self.data, start + (to - start) * min(1.0, i / ticks))
             self.wait(TICK_S)
+            # The command has arrived, or leads so far that the fingers push with all their force.
             there = i >= ticks or abs(fingers.commanded(self.data) - self.opening()) >= fingers.slack
             if there and self._rests() and max(opening, self.opening()) >= to - STUCK_M:
                 break
         fingers.command(self.data, to)
 
     def _rests(self) -> bool:
-        """Whether the joints and the fingers rest, by their encoders."""
+        """Whether the joints and the fingers are at rest."""
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
 
     def opening(self) -> float:
-        """What the fingers measure, [m] per finger."""
+        """Return the measured opening of each finger, [m]."""
         return self._fingers.opening(self.data)
 
     def encoders(self) -> Array:
-        """What the joints' encoders say, (joints,), [rad]."""
+        """Return the measured joint angles, (joints,), [rad]; they contain the joint errors."""
         return np.asarray(self.data.qpos[self._qpos] - self._off)
 
     def tip(self) -> Array:
-        """Where the tip is, (4, 4), world, by where the joints really are."""
+        """Return the pose of the tip by the true joint angles, (4, 4), world."""
         return self.scene.kinematics.forward(self.data.qpos[self._qpos])
 
     def memory(self) -> tuple[Any, ...]:
-        """What the controller knows, apart from the physics; for `remember`."""
+        """Return the state of the controller, without that of the physics, for `remember`."""
         return self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
 
     def remember(self, memory: tuple[Any, ...]) -> None:
-        """Go on from where a `memory` was made, once the physics are where they were then."""
+        """Restore the state that `memory` returned; the caller restores that of the physics."""
         self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, forces = memory
         self.forces.remember(forces)
 
     def in_hand(self) -> Array:
-        """The held part in the frame of the tip, (4, 4), for `GraspSlipMonitor`: nothing is decided by it."""
+        """Return the true pose of the held part in the frame of the tip, (4, 4), for `GraspSlipMonitor` only."""
         return np.asarray(pose.inverse(self.tip()) @ get_part_pose(self.scene.work, self.data, self.forces.held[0]))
 
     def slip(self, operation: int) -> None:
-        """What is in the hand moves along the pads, if the robot's errors state it; nothing else knows of it."""
+        """Shift the held parts in the hand by the slip that was drawn for an operation, unknown to the controller."""
         held = self.forces.held
         if self._error is None or not held or not self._error.slips(operation):
             return
@@ -261,18 +292,21 @@ class Robot:
             weld(self.scene, self.data, held[0], True)
 
     def compensate(self, off: Array) -> None:
-        """From now on the joints are off what is commanded by so much, (joints,), [rad], and no longer by what was."""
+        """Replace the joint errors, (joints,), [rad]: true minus measured angles, after calibration."""
         self._off = off
         if off.any():
             self.fidelity = "full"
 
     def steady(self, on: bool) -> None:
-        """From now on what is in the hand is carried through the air, or no longer; begin and end at rest."""
+        """Start or stop the removal of creep (`hold_steady`) while held parts are carried; called at rest."""
         friction = self.scene.grasp == "friction"
         self._carried = Carried(self.forces.held) if on and friction and self.forces.held else None
 
     def _spans(self, line: Trajectory, s: Array) -> list[tuple[int, int]]:
-        """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
+        """Return the stretches of a line that are simulated, as first and last indices into `s`.
+
+        With full fidelity this is the whole line; else the stretches where something is near, and always its end.
+        """
         n = len(s) - 1
         if self.fidelity == "full":
             return [(0, n)]
@@ -282,25 +316,32 @@ class Robot:
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _pass(self, seconds: float) -> None:
-        """Let time pass in which no force acts."""
+        """Advance the time without simulation, with no force on the held parts."""
         self.data.time += seconds
         self.forces.wrist((0.0, 0.0, 0.0), min(seconds, WRIST_S))
         self.left_out_s += seconds
 
     def reached(self, q: Array | None) -> Array:
-        """Joint angles, if the arm can be there; else the robot aborts."""
+        """Return the joint angles; abort the execution if they are None, since a pose is out of reach."""
         if q is None:
             raise ExecutionAborted(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
 
     def _commands(self, targets: Array) -> Array:
-        """What all drives are commanded, (n, controls), while the joints go to targets, (n, joints), [rad]."""
+        """Return the commands of all actuators, (n, controls), for joint targets, (n, joints), [rad].
+
+        The joint errors are added, since MuJoCo's servos act on true angles. The fingers keep their command.
+        """
         commands = np.repeat(self.data.ctrl[None], len(targets), axis=0)
         commands[:, self._drives] = targets + self._off
         return commands
 
     def _run(self, targets: Array, guard: Guard | None) -> int:
-        """Step through joint targets (n, joints), one physics step each; returns how many were run."""
+        """Command joint targets, (n, joints), one for each physics step, until a guard stops the motion.
+
+        Returns:
+            How many steps were taken.
+        """
         commands = self._commands(targets)
         for done in range(0, len(commands), self._steps_of_tick):
             tick = commands[done : done + self._steps_of_tick]
@@ -312,13 +353,13 @@ class Robot:
         return len(commands)
 
     def _tick(self, commands: Array, guard: Guard | None = None) -> int:
-        """One physics step for each command, (n, controls), between two looks.
+        """Take one physics step for each command, (n, controls), without checking the state between them.
 
-        Forces on what is held are read at each step, and all forces while the sensor at the wrist is on. Sensors of an
-        empty hand are read at the look only, so they are computed in the last step only.
+        Contact forces are read at each step if a part is held or the wrist sensor is on. With an empty hand they are
+        needed by `_look` only, so MuJoCo computes them in the last step only.
 
         Returns:
-            After how many steps the guard stopped it; 0 if it did not.
+            After how many steps the guard stopped the motion; 0 if it did not.
         """
         model = self.model
         data = self.data
@@ -351,7 +392,10 @@ class Robot:
         return steps if stopped else 0
 
     def _look(self) -> None:
-        """Once a tick: stability, contact force on the held part, blows to other parts; then the hook."""
+        """Check the state once a tick: abort if the simulation diverged or the arm collided; then call the hook.
+
+        Between these, the creep of carried parts is removed.
+        """
         if has_failed(self.data):
             raise ExecutionAborted(self.stage, "unstable_simulation")
         if self._carried is not None:

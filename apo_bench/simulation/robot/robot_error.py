@@ -1,6 +1,7 @@
-"""The errors of one robot during one trial: drawn before it, and known only to the physics.
+"""The calibration errors of a robot and the slip in its hand during one trial, known only to the physics.
 
-Planners, predictors and correctors know the nominal robot. Guards still act on the measured forces.
+They are drawn before the trial. Planners, predictors and correctors know the nominal robot; guards act on measured
+forces.
 """
 
 from dataclasses import dataclass, replace
@@ -15,19 +16,19 @@ from apo_bench.geometry import Array
 @final
 @dataclass(frozen=True, eq=False)
 class RobotError:
-    """The errors of one trial."""
+    """The calibration errors of the robot and the slip in its hand in one trial."""
 
     hand_eye: Array
-    """(4, 4): where the robot goes, in the world, for a pose in the world."""
+    """Hand-eye error E, (4, 4): the robot goes to E T for a pose T in the world."""
     joints: Array
-    """(joints,): by how much every joint is off what its encoder says, [rad]."""
+    """True joint angle minus encoder reading, (joints,), [rad]."""
     tool: Array
-    """(4, 4): where the tip comes to be, in the frame of where the robot estimates it."""
+    """Tool error, (4, 4): pose of the real tip in the frame of the estimated tip."""
     in_hand: Array
-    """(n, 4, 4): how the part of each operation slips when it was taken, in the frame of the tip."""
+    """Slip of the part of each of n operations after it was grasped, (n, 4, 4), in the frame of the tip."""
 
     def plan(self, plan: Plan) -> Plan:
-        """The plan as the robot takes it: everything where a wrong base puts it."""
+        """Return the plan with all poses shifted by the hand-eye error, as the robot executes it."""
         E = self.hand_eye
         if np.array_equal(E, np.eye(4)):
             return plan
@@ -35,5 +36,5 @@ class RobotError:
         return replace(plan, start=start, target_poses=E @ plan.target_poses, step_poses=E @ plan.step_poses)
 
     def slips(self, operation: int) -> bool:
-        """Whether the part of an operation moves in the hand."""
+        """Whether the part of an operation slips in the hand."""
         return not np.array_equal(self.in_hand[operation], np.eye(4))

@@ -1,9 +1,9 @@
-"""A sensor of force and torque at the wrist, with noise, an offset and a low pass.
+"""A force-torque sensor at the wrist, with noise, an offset (tare) and a low-pass filter.
 
-It measures what the arm exerts on its hand. What the surroundings exert on the hand, and on what is in it, is that, the
-other way round, less the weights. The robot knows the weight of its hand by its own model, that of a part by the part
-file and its estimated pose in the hand, and how the hand is turned by its encoders. Inertia stays in: a hand of 1 kg
-that gains 1 m/s in a second shows 1 N.
+The sensor measures the wrench that the arm exerts on its hand. The external wrench, of the surroundings on the hand and
+the held parts, is the known weights minus this reading. The robot knows the weight of the hand from its own model, and
+that of a part from the part file and its estimated pose in the hand. Its encoders give the orientation of the hand.
+Inertial forces are not compensated: a hand of 1 kg that accelerates at 1 m/s^2 shows 1 N.
 """
 
 import copy
@@ -23,25 +23,25 @@ from apo_bench.simulation.robot.gripper import open_hand
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene
 
 READING_S = 0.001
-"""Time from one reading to the next. Each is the mean since the one before, with new noise, whatever the step."""
+"""Time between readings. Each is the mean over this time plus new noise, whatever the physics step."""
 BANDWIDTH_HZ = 16.0
-"""Of the low pass, a time constant of 10 ms: so late a force is known, and the noise of a reading is 0.22 times."""
+"""Cutoff of the low-pass filter: a time constant of 10 ms, which leaves 0.22 of the noise of a reading."""
 OFFSETS = 20.0
-"""Standard deviation of what a sensor shows of nothing until it is zeroed, in standard deviations of its noise."""
-_GRAVITY = 9.81
-_ROUNDING_S = 1e-9
+"""Standard deviation of the offset of a sensor before it is zeroed, in standard deviations of its noise."""
+_GRAVITY = 9.81  # [m/s^2]
+_ROUNDING_S = 1e-9  # tolerance for sums of physics steps
 
 
 class Load(NamedTuple):
-    """What hangs on the sensor."""
+    """A mass that hangs on the sensor: the hand, or a part in it."""
 
     mass_kg: float
     center: Array
-    """Its centre of mass, (3,), in the frame of the tip, [m]."""
+    """Centre of mass, (3,), in the frame of the tip, [m]."""
 
 
 def hand_load(kinematics: Kinematics, opening: float) -> Load:
-    """The hand at an opening [m], by the model of the arm alone."""
+    """Return mass and centre of the hand at an opening of each finger, [m], from the model of the arm alone."""
     data, T_tip = open_hand(kinematics, opening)
     mount = kinematics.model.body(kinematics.arm.mount).id
     center = T_tip[:3, :3].T @ (data.subtree_com[mount] - T_tip[:3, 3])
@@ -49,7 +49,11 @@ def hand_load(kinematics: Kinematics, opening: float) -> Load:
 
 
 def compute_part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...]:
-    """Parts by their files, each (4, 4) at its estimated pose in the hand."""
+    """Return the loads of held parts, with densities from their part files.
+
+    Args:
+        T_tip_part: Estimated pose of each part in the frame of the tip, (4, 4).
+    """
     loads = []
     for part, T in T_tip_part.items():
         solid = scene.scenario.assembly.solids[part]
@@ -59,15 +63,18 @@ def compute_part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[L
 
 
 def compute_low_pass_gain(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
-    """How much of a new reading goes into the filtered one."""
+    """Return the gain a of the low pass y' = (1 - a) y + a x, called once per reading x."""
     return 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
 
 
 def filter_noise(noise: FtNoise, part: float) -> FtNoise:
-    """What a low pass leaves of the noise: y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
+    """Return the standard deviations of noise behind a low pass.
+
+    The output of y' = (1 - a) y + a x has a / (2 - a) times the variance of the white noise x.
 
     Args:
-        part: a, how much of a new reading goes into the filtered one.
+        noise: Standard deviations of a reading.
+        part: The gain a, from `compute_low_pass_gain`.
     """
     left = math.sqrt(part / (2.0 - part))
     return FtNoise(left * noise.force_n, left * noise.torque_nm)
@@ -89,13 +96,16 @@ class WristSensor:
         """Draw the offset of the trial.
 
         Args:
-            sensordata: That of the simulation; of it, the sensors of the wrist are read.
-            encoders: What the joints' encoders say, (joints,), [rad].
-            rng: Six numbers now, and six at each reading.
+            scene: The scene whose robot has the sensor.
+            sensordata: `MjData.sensordata` of the simulation; a view of its wrist sensors is read at each step.
+            encoders: Returns the measured joint angles, (joints,), [rad].
+            noise: Standard deviations of a reading, per axis.
+            rng: Source of six numbers now and six at each reading.
+            bandwidth_hz: Cutoff frequency of the low pass.
         """
         first = [int(scene.work.model.sensor_adr[scene.work.model.sensor(name).id]) for name in WRIST_SENSORS]
         self._raw_at = first[0]
-        self._raw = sensordata[first[0] : first[1] + 3]
+        self._raw = sensordata[first[0] : first[1] + 3]  # force, then torque, in the frame of the sensor
         self._kinematics = scene.kinematics
         self._encoders = encoders
         self._sigma = np.repeat(noise, 3)
@@ -118,21 +128,26 @@ class WristSensor:
 
     @property
     def sigma(self) -> tuple[float, float]:
-        """Standard deviation behind the low pass, per axis, [N] and [Nm]."""
+        """Standard deviations of force and torque behind the low pass, per axis, [N] and [Nm]."""
         return filter_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:
-        """Set what is in the hand, or nothing, by its estimate (`compute_part_loads`), whose weight is subtracted."""
+        """Set the held parts, from `compute_part_loads`, whose weight is compensated; none for an empty hand."""
         self._held = parts
         T = pose.inverse(self._T_tip_sensor)
         loads = (self._hand, *parts)
         mass = sum(load.mass_kg for load in loads)
         moment = sum((load.mass_kg * (T[:3, :3] @ load.center + T[:3, 3]) for load in loads), np.zeros(3))
         # The arm carries each weight, m g upwards at its centre c: a force m g up, and a torque m c x g up.
+        # `_weights`, (6, 3), maps the up direction, in the frame of the sensor, to this wrench.
         self._weights = _GRAVITY * np.vstack([mass * np.eye(3), pose.hat(moment)])
 
     def begin(self, hand: Load) -> None:
-        """Begin again after time in which nothing was read: the first reading is taken as it is."""
+        """Restart the filter after a time without readings: the next reading is taken unfiltered.
+
+        Args:
+            hand: The hand at its present opening, from `hand_load`.
+        """
         self._hand = hand
         self.hold(*self._held)
         self._sum = np.zeros(6)
@@ -140,7 +155,7 @@ class WristSensor:
         self._filtered = None
 
     def take(self, step_s: float) -> bool:
-        """Take up what the last physics step left in the sensors; whether that made a reading."""
+        """Add the sensor data of the last physics step, which lasted `step_s`; return whether a reading is complete."""
         self._sum += step_s * self._raw
         self._summed_s += step_s
         self._clock_s += step_s
@@ -156,7 +171,11 @@ class WristSensor:
         return True
 
     def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
-        """The same sensor, as it is zeroed, in another simulation of its robot and with other noise."""
+        """Return a copy, with the same offset and tare, for another simulation of its robot and other noise.
+
+        Args:
+            sensordata, encoders, rng: As for the constructor.
+        """
         other = copy.copy(self)
         other._raw = sensordata[self._raw_at : self._raw_at + 6]
         other._encoders = encoders
@@ -165,39 +184,43 @@ class WristSensor:
         return other
 
     def start_zero(self) -> None:
-        """From now on the arm stands still in free air."""
+        """Start to collect readings for `end_zero`, while the arm stands still in free air."""
         self._readings = []
 
     def end_zero(self) -> None:
-        """What the readings since `start_zero` show on average, but for the weights, is no force of anything."""
+        """Tare the sensor: the mean reading since `start_zero`, less the known weights, is its offset."""
         if self._readings:
+            # Row 2 of the sensor's rotation is the up direction in its own frame.
             self._zero = np.mean(self._readings, axis=0) - self._weights @ self._sensor()[2, :3]
         self._readings = None
 
     def wrench(self, about: Array) -> Array:
-        """Force and torque about a point, (3,) world, of the surroundings on the hand and what is in it, filtered.
+        """Return the filtered external wrench on the hand and the held parts.
+
+        Args:
+            about: The point to which the torque refers, (3,), world, [m].
 
         Returns:
-            (6,): [N] and [Nm], along world axes; zero before the first reading.
+            Force, [N], and torque, [Nm], (6,), along world axes; zero before the first reading.
         """
         if self._filtered is None:
             return np.zeros(6)
         T = self._sensor()
         out = (self._weights @ T[2, :3] + self._zero - self._filtered).reshape(2, 3) @ T[:3, :3].T
-        f, t = out
+        f, t = out  # views, so the next line changes `out`
         t += pose.hat(T[:3, 3] - about) @ f
         return np.asarray(out.ravel())
 
     def wrench_there(self) -> Array:
-        """As `wrench`, about the sensor itself: the flange."""
+        """Return `wrench` about the origin of the sensor, at the flange."""
         return self.wrench(self._sensor()[:3, 3])
 
     def stops(self, guard: Guard | None) -> bool:
-        """Whether the hand is pushed back along the way of a guard by more than it allows."""
+        """Whether the external force against the direction of the guard exceeds its limit; False without a guard."""
         if guard is None:
             return False
         return -float(self.wrench(np.zeros(3))[:3] @ guard.direction) > guard.newton
 
     def _sensor(self) -> Array:
-        """Where the sensor is by the encoders, (4, 4), world."""
+        """Return the pose of the sensor by the encoders, (4, 4), world."""
         return np.asarray(self._kinematics.forward(self._encoders()) @ self._T_tip_sensor)

@@ -1,4 +1,4 @@
-"""Scenes of parts and an arm as MuJoCo models."""
+"""Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels

@@ -1,7 +1,7 @@
-"""Compose the room, the parts and the hands or the arm, as MuJoCo's `MjSpec`.
+"""Compose the room, the parts and the hands or the arm into an `MjSpec`.
 
-Everything that is attached keeps its names behind a prefix: part `stick` is the body `stick/`, which holds the joint,
-and in it the body of its file, `stick/stick`, with its geoms and faces (sites) `stick/bar`, `stick/px`.
+Attached files keep their names behind a prefix: part `stick` is the body `stick/`, which holds the joint. Its child is
+the body of the part file, `stick/stick`, with geoms and faces (sites) such as `stick/bar`, `stick/px`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,27 +26,30 @@ from apo_bench.simulation.scene.world import WRIST_SENSORS
 HANDS = ("hand0", "hand1")
 _HAND_SOLREF = (0.01, 1.0)
 _HAND_SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
-"""Soft like a hand: a part held by it yields a little and is not torn through its neighbours."""
+"""Soft welds of a hand: a held part yields a little and is not pulled through its neighbours."""
+# Welds of the ideal gripper.
 _ARM_SOLREF = (0.004, 1.0)
 _ARM_SOLIMP = (0.98, 0.999, 0.0005, 0.5, 2.0)
 _MEMORY = 64 << 20
-"""For the contacts of many pieces at once: what MuJoCo takes by itself is too little for rings of wedges that fall."""
+"""Memory of MuJoCo's stack for many simultaneous contacts; its default is too small for falling rings of wedges."""
 _PAD_CONDIM = 4
-"""Of all that an arm touches by: pads resist turning."""
+"""For all geoms of an arm: pads have torsional friction."""
 _NEAREST_M = 1e-10
-"""How exactly the distance of pieces that are no boxes is found. With MuJoCo's 1e-6, flat faces that graze each other
-by less are at times found to be millimetres inside of each other, and leap apart."""
+"""Tolerance of the distance between pieces that are no boxes.
+
+With MuJoCo's 1e-6, flat faces that graze each other by less sometimes seem to penetrate by millimetres and jump apart.
+"""
 _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
-"""Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
-_WRIST_SITE = "wrist"
+"""`intprm` of a contact sensor: data field, reduction (3: net force), number of results."""
+_WRIST_SITE = "wrist"  # does not collide with names of arm and parts, which have a slash
 _BEHIND_PICTURE = 3
-"""Of MuJoCo's groups of geoms, 0 to 2 are shown."""
+"""Geom group of pieces behind a picture; MuJoCo shows groups 0 to 2."""
 _HIDDEN_GROUP = 5
-"""The site of the wrist's sensors, in a group that no picture shows; names of arms and parts have a slash."""
+"""Site group of the wrist sensors, which no picture shows."""
 
 
 def with_hands(room: Any, scenario: Scenario) -> Any:
-    """Where the human demonstrates: a room with parts, and two hands that each may hold any movable one."""
+    """The world of the demonstration: the room with parts, and two hands that can each hold any movable part."""
     spec = room.copy()
     for i, hand in enumerate(HANDS):
         mocap = spec.worldbody.add_body(name=hand, mocap=True, pos=(0.0, 0.5 + 0.1 * i, 0.3))
@@ -63,11 +66,12 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
 
 
 def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
-    """Where the robot replays: a room with parts, the arm, sensors of force, and welds where it grasps by them.
+    """The world of the replay: the room with parts, the arm, force sensors, and welds for the ideal gripper.
 
-    Last come the sensors of the wrist, which stay off until a replay needs them (`switch_wrist_sensors_on`).
+    The wrist sensors come last; they stay off until a replay needs them (`switch_wrist_sensors_on`).
 
     Args:
+        grasp: `friction` or `weld`.
         first_link: The first body of the arm that moves.
     """
     spec = room.copy()
@@ -81,7 +85,7 @@ def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: 
 
 
 def room_with_parts(scenario: Scenario, clearance_mm: float, settings: Physics) -> Any:
-    """The room and every part at its start.
+    """The room and every part at its start pose.
 
     Raises:
         InputError: The file of a part has changed since the scenario was loaded.
@@ -111,7 +115,11 @@ def _add_part(
     settings: Physics,
     bits: Mapping[str, Bits],
 ) -> None:
-    """Attach a part's file at T, its fit faces receded."""
+    """Attach a part at its start pose T, (4, 4), with its fit faces receded by the clearance.
+
+    Args:
+        bits: Contact bits by the name of a piece.
+    """
     solid = scenario.assembly.solids[part]
     require(
         [piece.name for piece in file.pieces] == [piece.name for piece in solid.pieces],
@@ -125,14 +133,14 @@ def _add_part(
             geom.rgba = (*scenario.colors[part], 1.0)
     body = spec.worldbody.add_body(name=f"{part}/", pos=T[:3, 3])
     body.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
-    body.alt.xyaxes = (*T[:3, 0], *T[:3, 1])
+    body.alt.xyaxes = (*T[:3, 0], *T[:3, 1])  # rotation by the directions of x and y
     if part not in scenario.assembly.fixed:
         body.add_freejoint(name=f"{part}/")
     spec.attach(own, frame=body.add_frame(), prefix=f"{part}/")
 
 
 def _bare_part(model: PartModel) -> Any:
-    """A part whose geoms have no shape yet, with its sites and its picture; with a picture its pieces are hidden."""
+    """A part with its sites and picture, whose geoms have no shape yet; a picture hides its pieces."""
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name=model.body)
     group = 0 if model.picture is None else _BEHIND_PICTURE
@@ -146,22 +154,22 @@ def _bare_part(model: PartModel) -> Any:
 
 
 def movable_parts(scenario: Scenario) -> tuple[str, ...]:
-    """In the order of the scenario."""
+    """The movable parts, in the order of the scenario."""
     return tuple(part for part in scenario.assembly.solids if part not in scenario.assembly.fixed)
 
 
 def fixed_parts(scenario: Scenario) -> tuple[str, ...]:
-    """In the order of the scenario."""
+    """The fixed parts, in the order of the scenario."""
     return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
 
 
 def _movable_bodies(scenario: Scenario, spec: Any) -> Mapping[str, str]:
-    """Movable part -> the body that has its mass; the one around it has none."""
+    """Movable part -> the inner body, which has its mass; the outer body with the joint has none."""
     return {part: spec.body(f"{part}/").bodies[0].name for part in movable_parts(scenario)}
 
 
 def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[float], solimp: Iterable[float]) -> None:
-    """Add a weld that is off; who switches it on sets where it holds."""
+    """Add an inactive weld; its relative pose is set when it is activated."""
     weld = spec.add_equality(
         name=name,
         type=mujoco.mjtEq.mjEQ_WELD,
@@ -173,29 +181,33 @@ def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[fl
         solimp=solimp,
     )
     weld.data[:] = 0.0
-    weld.data[10] = 1.0  # how much a turn counts against a shift, MuJoCo's own
+    weld.data[10] = 1.0  # `torquescale`: weight of rotation against translation, MuJoCo's default
 
 
 def _add_arm(spec: Any, arm: Arm, settings: Physics) -> None:
+    """Attach the arm at its base, and let it collide with parts."""
     own = load_model(arm.mjcf, "arm") if arm.model is None else mujoco.MjSpec.from_string(arm.model)
     set_contact(own.geoms, settings)
     if arm.hand is not None:
         for geom in own.geoms:
             geom.condim = _PAD_CONDIM
-            geom.priority = 1
+            geom.priority = 1  # the pads' friction counts, not the larger of both
     for geom in own.geoms:
-        if geom.conaffinity & 1:  # it met parts, by the bit that they had
+        if geom.conaffinity & 1:  # in its own file it collides with bit 1, so let it collide with parts
             geom.conaffinity |= OF_PARTS
     stand = spec.worldbody.add_body(name="arm/", pos=arm.base, quat=arm.turn)
     spec.attach(own, frame=stand.add_frame(), prefix="arm/")
 
 
 def _add_force_sensors(spec: Any, scenario: Scenario, arm: str) -> None:
-    """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
+    """Add contact force sensors: of every movable part on everything it touches, then of every part on the arm.
 
-    MuJoCo computes a sensor while one of the two bodies that it names is awake, and a body that cannot move never is.
-    So the arm is named by its first link that moves: by its base, a fixed part and the arm would have no sensor of each
-    other while sleep is on.
+    MuJoCo computes such a sensor only while one of its two bodies is awake, and a body that cannot move never is. So
+    the arm is named by its first moving link. By its base, a fixed part and the arm would have no sensor while sleep is
+    allowed.
+
+    Args:
+        arm: The first moving link.
     """
     for part in movable_parts(scenario):
         _add_force_sensor(spec, f"all_{part}", f"{part}/", None)
@@ -204,6 +216,7 @@ def _add_force_sensors(spec: Any, scenario: Scenario, arm: str) -> None:
 
 
 def _add_force_sensor(spec: Any, name: str, subtree: str, other: str | None) -> None:
+    """Add a sensor of the net contact force of a subtree, on `other` or (None) on everything."""
     sensor = spec.add_sensor(
         name=name,
         type=mujoco.mjtSensor.mjSENS_CONTACT,
@@ -217,9 +230,9 @@ def _add_force_sensor(spec: Any, name: str, subtree: str, other: str | None) -> 
 
 
 def _add_wrist_sensors(spec: Any, mount: str) -> None:
-    """What the arm exerts on its hand where that is mounted: force and torque, in the frame of the mount.
+    """Add sensors of force and torque between arm and hand, in the frame of the mount.
 
-    MuJoCo has weight and inertia of the hand in it, and all that is held or touched by it, welded or by friction.
+    They include weight and inertia of the hand and of all that it holds or touches.
     """
     spec.body(mount).add_site(name=_WRIST_SITE, group=_HIDDEN_GROUP)
     for name, kind in zip(WRIST_SENSORS, (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE), strict=True):

@@ -1,8 +1,8 @@
-"""Choose by contact bits which pieces can meet.
+"""Choose MuJoCo's contact bits so that pieces skip collisions with walls of holes that they cannot enter.
 
-What is wider than a hole without its walls does not go in, and what is behind the walls holds it up: contacts with the
-walls themselves are not needed. It may dig in with an edge, by the thickness of the walls deeper than it would. All
-that could go in, the arm, and walls with nothing behind them meet as ever; walls do not meet walls.
+A piece that is wider than a hole cannot enter it: the piece behind the wall supports it, so contacts with the wall
+itself are not needed. Its edge may penetrate by the thickness of the wall. Pieces that could enter, the arm, and walls
+with nothing behind them collide as usual; walls do not collide with each other.
 """
 
 from collections.abc import Mapping
@@ -14,26 +14,29 @@ from apo_bench.geometry import Box, Piece, Solid
 from apo_bench.simulation.scene.walls import linings, simulated_pieces
 
 _ARM = 1
-"""The bit by which an arm meets everything."""
+"""Bit by which an arm collides with everything."""
 OF_PARTS = (1 << 31) - 1 - _ARM
-"""All other bits: what parts meet by."""
+"""All other bits: parts collide by them."""
 _PARTS = 1 << 30
-"""The bit by which parts meet each other; those below it are of holes, the narrowest has the highest."""
+"""Bit by which parts collide with each other; lower bits are for holes, the highest for the narrowest."""
 _MOST = 16
-"""So many widths of holes are distinguished; wider ones count as one."""
+"""Number of distinguished widths of holes; the widest share the last bit."""
 _SURELY_M = 1e-4
-"""What is wider than the hole without its walls by this stays out."""
+"""A piece cannot enter if it is this much wider than the hole without its walls."""
 
 
 class Bits(NamedTuple):
-    """Two geoms meet if the `contype` of one and the `conaffinity` of the other have a bit in common."""
+    """MuJoCo's contact bits of a geom.
+
+    Two geoms collide if the `contype` of one and the `conaffinity` of the other have a common bit.
+    """
 
     contype: int
     conaffinity: int
 
 
 def meetings(solids: Mapping[str, Solid], clearance_m: float) -> Mapping[str, Mapping[str, Bits]]:
-    """Part -> name of a piece as it is simulated -> its bits."""
+    """Part -> name of a simulated piece -> its contact bits."""
     lined = {part: linings(solid, clearance_m) for part, solid in solids.items()}
     widths = sorted({round(width, 6) for walls in lined.values() for width in walls.values()})
     return {
@@ -47,18 +50,20 @@ def meetings(solids: Mapping[str, Solid], clearance_m: float) -> Mapping[str, Ma
 
 
 def is_lining(bits: Bits) -> bool:
-    """Whether these are the bits of a wall that not all meets."""
+    """Whether these are the bits of a wall that some pieces do not collide with."""
     return not bits.contype & (_ARM | _PARTS)
 
 
 def _of_wall(width: float, widths: list[float]) -> Bits:
+    """The bits of a wall; `width` is its distance from the axis to what lies behind."""
     return Bits(_hole(widths.index(round(width, 6))), _ARM)
 
 
 def _of(piece: Piece, widths: list[float]) -> Bits:
+    """The bits of a piece that is no wall: it collides with the walls of all holes that it may enter."""
     if not widths:
         return Bits(_ARM, _ARM)
-    narrow = widest_disc(piece)
+    narrow = widest_disc(piece)  # it cannot enter a hole of a smaller radius
     met = _ARM | _PARTS
     for i, width in enumerate(widths):
         if narrow <= width + _SURELY_M:
@@ -67,19 +72,21 @@ def _of(piece: Piece, widths: list[float]) -> Bits:
 
 
 def _hole(i: int) -> int:
+    """The bit of the hole width with index i, the narrowest first."""
     return _PARTS >> (1 + min(i, _MOST - 1))
 
 
 def widest_disc(piece: Piece) -> float:
-    """The radius of a flat disc inside of a piece, [m]: the piece does not go through a narrower hole.
+    """The radius of a flat disc inside a piece, [m]; the piece cannot enter a narrower hole.
 
-    Of boxes and cylinders it is the widest, of other pieces the widest about their middle that is parallel to a side.
+    For boxes and cylinders it is the widest such disc, for other pieces the widest about the mean corner that is
+    parallel to a side.
     """
     if isinstance(piece, Box):
-        return float(np.sort(piece.half)[1])
+        return float(np.sort(piece.half)[1])  # across the shortest side
     if piece.cylinder is not None:
         return piece.cylinder.radius
-    # From the middle, along a plane of normal m, a side of normal n is at its distance / |n x m|.
+    # In a plane of normal m through the middle, the distance to a side of normal n is its distance / |n x m|.
     n = piece.planes[:, :3]
     far = piece.planes[:, 3] - n @ piece.corners.mean(axis=0)
     return float((far / np.sqrt(np.maximum(1.0 - (n @ n.T) ** 2, 1e-12))).min(axis=1).max())

@@ -1,9 +1,8 @@
-"""Make convex pieces geoms of MuJoCo.
+"""Convert convex pieces of parts to MuJoCo geoms.
 
-Boxes and cylinders stay what they are; everything else becomes the mesh of its corners.
-
-MuJoCo moves and turns a mesh into the frame of its own inertia, and the pose of the geom undoes that: corners in the
-frame of the part are found there again, where the geom has no pose.
+Boxes and cylinders keep their type; all other pieces become meshes of their corners. MuJoCo moves a mesh into the frame
+of its own inertia, and the pose of the geom undoes that. So corners in the part frame stay there if the geom has no
+pose.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,32 +15,39 @@ from apo_bench.geometry import Array, Hull, Piece, Solid, all_boxes
 from apo_bench.simulation.scene.contact_bits import Bits, is_lining
 
 _ROLLING_CONDIM = 6
-"""Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""
+"""For cylinders: without rolling friction, one that lies on a box starts to roll by itself."""
 _GRIPPY = 0.8
-"""A part of less sliding friction is smooth; the pads' friction is meant on one of so much."""
+"""Sliding friction below which a part is smooth; the friction of pads is stated against a part with this value."""
 SMOOTH_PRIORITY = 2
-"""Of a smooth part, over that of pads, 1: its own friction counts wherever it touches anything. Otherwise it would be
-the pads', or the larger of the two."""
+"""Geom priority of a smooth part, above that of pads (1).
+
+Its own friction then counts in all contacts, rather than the pads' or the larger of both.
+"""
 _PADS_CONDIM = 4
-"""Of contacts with pads: torsional friction, too."""
+"""For contacts with pads: sliding and torsional friction."""
 _SURFACE = ("friction", "density", "rgba", "condim")
-"""What a geom has but its shape."""
+"""Attributes of a geom that do not depend on its shape."""
 
 
 def add_pieces(spec: Any, body: Any, pieces: Iterable[Piece], surface: Mapping[str, Any], prefix: str = "") -> None:
-    """Give a body a geom for each piece."""
+    """Add a geom to a body for each piece.
+
+    Args:
+        surface: Attributes of the geoms, such as friction.
+        prefix: Of the names of the geoms.
+    """
     for piece in pieces:
         set_shape(spec, body.add_geom(name=prefix + piece.name, **surface), piece)
 
 
 def set_shape(spec: Any, geom: Any, piece: Piece) -> None:
-    """Give a geom the shape of a piece; the mesh of its corners, where it needs one, is called like the geom."""
+    """Give a geom the shape of a piece; if that needs a mesh of the corners, the mesh is named like the geom."""
     if not isinstance(piece, Hull):
         geom.type = mujoco.mjtGeom.mjGEOM_BOX
         geom.pos = piece.center
         geom.size = piece.half
     elif piece.cylinder is None:
-        # corners are all that is known of a mesh, so its inertia is that of their hull
+        # A mesh has corners only, so its inertia is that of their convex hull.
         convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         spec.add_mesh(name=geom.name, uservert=piece.corners.ravel(), inertia=convex)
         geom.type = mujoco.mjtGeom.mjGEOM_MESH
@@ -59,7 +65,7 @@ def set_shape(spec: Any, geom: Any, piece: Piece) -> None:
 
 
 def set_mass(body: Any, solid: Solid, density: float) -> None:
-    """Give a body the mass of the nominal solid; one of boxes alone is its own mass.
+    """Give a body mass and inertia of the nominal solid; a solid of boxes keeps those of its geoms.
 
     Args:
         density: [kg/m^3].
@@ -69,21 +75,22 @@ def set_mass(body: Any, solid: Solid, density: float) -> None:
     J: Array = density * solid.inertia
     body.ipos = solid.centroid
     body.mass = density * solid.volume
-    body.fullinertia = np.concatenate([np.diag(J), J[[0, 0, 1], [1, 2, 2]]])
+    body.fullinertia = np.concatenate([np.diag(J), J[[0, 0, 1], [1, 2, 2]]])  # order: xx, yy, zz, xy, xz, yz
     body.explicitinertial = True
 
 
 def dress(
     spec: Any, solid: Solid, pieces: Mapping[str, Iterable[Piece]], density: float, bits: Mapping[str, Bits]
 ) -> None:
-    """Give the geoms of a part, as its file was read, the shapes of its pieces, and the part its mass.
+    """Give the geoms of a part file the shapes of the simulated pieces, and the part its mass.
 
-    Walls of holes that not everything meets are a body of their own, fixed in the part: MuJoCo passes over it as one.
+    Walls that some pieces do not collide with go to a child body fixed in the part, which MuJoCo's broad phase skips as
+    one.
 
     Args:
-        pieces: By the name of the geom in the part file, which is that of one of them, or goes; others become geoms
-            like it.
-        bits: By the name of a piece, what it meets.
+        pieces: Name of a geom in the part file -> the pieces that replace it. The piece of the same name takes the
+            geom; others become new geoms like it; without such a piece the geom is deleted.
+        bits: Contact bits by the name of a piece.
     """
     body = spec.worldbody.bodies[0]
     lining = body.add_body(name=f"{body.name}_lining") if any(map(is_lining, bits.values())) else body

@@ -1,4 +1,4 @@
-"""Refuse parts that the gripper cannot hold, before anything moves."""
+"""Reject parts that the gripper cannot hold (too wide, too heavy, too smooth) before the robot moves."""
 
 from typing import Any
 
@@ -13,18 +13,19 @@ from apo_bench.simulation.scene.world import World
 
 _GRAVITY = 9.81
 _SAFE = 2.0
-"""Friction must hold so many times the weight: carried, a part also pulls by its inertia and its lever."""
+"""Factor of safety of the friction over the weight, for inertia and lever of a carried part."""
 _BESIDE_M = 0.002
-"""Room beside the part for each finger."""
+"""Gap between the part and each open finger."""
 
 
 def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
-    """Raise an `InputError` if a part is wider than the gripper opens where it is to be held, too heavy or too smooth.
+    """Raise an `InputError` if a part is too wide for the open gripper, too heavy or too smooth.
 
-    Parts of boxes alone are held across all their width, and a gripper that finds nothing loses them.
+    The span of boxes between the pads is not required to be found: they are held across their whole width.
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
         solid = scenario.assembly.solids[operation.main]
+        # Opposite of the direction of approach, part frame.
         up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
         span = measure_held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
@@ -63,7 +64,7 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
 
 
 def _grip(model: Any, arm: Arm) -> tuple[float, float]:
-    """The force of both pads together, [N], infinite where that of the fingers has no limit; and their friction."""
+    """(force of both pads together, [N], infinite if not limited; coefficient of friction of the pads)."""
     if arm.hand is not None:
         return 2 * arm.hand.force_n, arm.hand.friction
     force = float(model.actuator(f"arm/{arm.grip}").forcerange[1])
@@ -73,7 +74,7 @@ def _grip(model: Any, arm: Arm) -> tuple[float, float]:
 
 
 def _smooth_friction(world: World, part: str) -> float | None:
-    """The friction of a part that counts in place of that of pads; None of one that is not smooth."""
+    """The friction of a smooth part, which counts instead of the pads'; None if the part is not smooth."""
     model = world.model
     root = model.body_rootid[world.body[part]]
     geoms = np.flatnonzero((model.body_rootid[model.geom_bodyid] == root) & (model.geom_priority == SMOOTH_PRIORITY))

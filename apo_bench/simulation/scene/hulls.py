@@ -1,4 +1,4 @@
-"""Convex pieces cut by planes, and put together where they make a convex piece again."""
+"""Cut convex pieces by planes, and join them where the union is convex again."""
 
 from collections.abc import Iterable
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from apo_bench.geometry import Array, Hull, find_distinct_directions, remember
 
-ON_M = 1e-7  # planes that are nearer are one
-PARALLEL = 1e-7  # if their normals differ by no more
-_SAME_VOLUME = 1e-6
+ON_M = 1e-7  # parallel planes at a smaller distance are equal
+PARALLEL = 1e-7  # normals with a cosine above 1 - this are parallel
+_SAME_VOLUME = 1e-6  # relative difference of volumes that are equal
 
 
 def clip_hull(hull: Hull, cut: Array) -> Hull:
-    """What of a piece is on the inner side of a plane (n, d), n . x <= d, that goes through it."""
-    # The corners below the plane, and where the lines from those to the corners above it cross it; the hull of all that
-    # is the piece that was cut off, since lines through its inside end inside it.
+    """The piece on the inner side of a plane (n, d), n . x <= d, that intersects it."""
+    # Corners of the result: those below the plane, and the intersections of the plane with all lines from corners below
+    # to corners above. Such lines lie in the piece, so the hull of these points is the clipped piece.
     height = hull.corners @ cut[:3] - cut[3]
     low = hull.corners[height <= 0.0]
     high = hull.corners[height > 0.0]
@@ -26,20 +26,20 @@ def clip_hull(hull: Hull, cut: Array) -> Hull:
 
 
 def enclose(a: Hull, b: Hull) -> Hull:
-    """The piece around two pieces, with the name of the first."""
+    """The convex hull of two pieces, with the name of the first."""
     return _hull_of(a.name, np.concatenate([a.corners, b.corners]))
 
 
 @remember
 def volume(hull: Hull) -> float:
-    """[m^3]."""
+    """The volume of a piece, [m^3]."""
     from scipy.spatial import ConvexHull
 
     return float(ConvexHull(hull.corners).volume)
 
 
 def join_neighbours(pieces: Iterable[Hull]) -> list[Hull]:
-    """Neighbours as one piece where they make a convex one; only what comes one after the other is tried."""
+    """Join consecutive pieces whose union is convex."""
     found: list[Hull] = []
     for piece in pieces:
         both = _as_one(found[-1], piece) if found else None
@@ -51,7 +51,7 @@ def join_neighbours(pieces: Iterable[Hull]) -> list[Hull]:
 
 
 def join_convex(pieces: Iterable[Hull]) -> list[Hull]:
-    """Any two as one piece where they make a convex one."""
+    """Join any two pieces whose union is convex, until none is left."""
     left = list(pieces)
     done: list[Hull] = []
     while left:
@@ -78,7 +78,7 @@ def has_side(hull: Hull, plane: Array) -> bool:
 
 
 def set_back(hull: Hull, flats: Iterable[Array], by_m: float) -> Hull:
-    """A piece whose sides in these planes have moved inwards."""
+    """The piece with its sides in the planes `flats`, (n, d) each, moved inwards by `by_m`."""
     for plane in flats:
         if has_side(hull, plane):
             hull = clip_hull(hull, plane - [0.0, 0.0, 0.0, by_m])
@@ -86,31 +86,32 @@ def set_back(hull: Hull, flats: Iterable[Array], by_m: float) -> Hull:
 
 
 def _as_one(a: Hull, b: Hull) -> Hull | None:
+    """The union of two pieces if it is convex, else None."""
     both = enclose(a, b)
     whole = volume(both)
     return both if abs(whole - volume(a) - volume(b)) < _SAME_VOLUME * whole else None
 
 
 def _beside(a: Hull, b: Hull) -> bool:
-    """Whether a side of one is in the plane of a side of the other, looks the other way, and is near."""
+    """Whether two pieces touch at coplanar sides with opposite normals."""
     if (np.abs(a.center - b.center) > a.half + b.half + ON_M).any():
         return False
     n = a.planes[:, :3] @ b.planes[:, :3].T
-    d = a.planes[:, 3][:, None] + b.planes[:, 3]
+    d = a.planes[:, 3][:, None] + b.planes[:, 3]  # 0 for coplanar sides with opposite normals
     return bool(((n < PARALLEL - 1.0) & (np.abs(d) < ON_M)).any())
 
 
 def _hull_of(name: str, points: Array) -> Hull:
-    """The piece around points, with its corners alone."""
+    """The convex hull of points, (k, 3), without points inside its sides and edges."""
     from scipy.spatial import ConvexHull, QhullError
 
-    # Qhull divides sides into triangles: of each plane one is kept, and a corner is where three of these meet.
+    # Qhull divides sides into triangles: one per plane is kept, and a point on at least three planes is a corner.
     hull = ConvexHull(points)
     sides = hull.equations[find_distinct_directions(hull.equations[:, :3], signed=True)]
     corners = points[hull.vertices]
     on = np.abs(corners @ sides[:, :3].T + sides[:, 3]) < 1e-9
     kept = corners[on.sum(axis=1) >= 3]
-    # Of a small piece sides that hardly differ may be more than one, and corners of it more than these.
+    # Nearly parallel sides of a small piece may have been merged, which would lose corners: then all points are kept.
     try:
         is_whole = len(kept) == len(corners) or ConvexHull(kept).volume > (1.0 - _SAME_VOLUME) * hull.volume
     except (QhullError, ValueError):

@@ -1,4 +1,4 @@
-"""Arrows drawn into a picture: where a part may be shifted, and about what it may be turned."""
+"""Draw arrows and rings into a picture: directions in which a part may shift, and axes about which it may rotate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ import numpy as np
 from apo_bench.geometry import Array, freeze
 
 _Color = tuple[float, float, float]
-_WIDTH_M = 0.0035
+_WIDTH_M = 0.0035  # of arrows and rings
 _PIECES = 48
-"""Straight pieces of a whole ring."""
-_SWEEP_RAD = np.radians(304.0)
-_HEAD_M = 0.022
+"""Straight pieces of a ring."""
+_SWEEP_RAD = np.radians(304.0)  # angle that a ring covers
+_HEAD_M = 0.022  # length of the arrow head of a ring
 _NAME_M = 0.011
-"""How far beyond its mark a name stands."""
+"""Distance of a name beyond its mark."""
 _NOWHERE = np.zeros(3)
 _UPRIGHT = np.eye(3).ravel()
 
@@ -25,16 +25,16 @@ _UPRIGHT = np.eye(3).ravel()
 @final
 @dataclass(frozen=True, eq=False)
 class ShiftArrows:
-    """Two arrows that point away from each other along an axis."""
+    """Two arrows in opposite directions along an axis."""
 
     center: Array
     """(3,), world frame, [m]."""
     axis: Array
     """Unit vector, (3,), world frame."""
     inner_m: float
-    """How far from the centre they begin."""
+    """Distance from the centre at which they begin."""
     outer_m: float
-    """How far from it they end."""
+    """Distance from the centre at which they end."""
     color: _Color
     name: str = ""
 
@@ -43,21 +43,21 @@ class ShiftArrows:
 
     @property
     def tips(self) -> Array:
-        """Where the name of the arrows may stand, (2, 3)."""
+        """Possible positions of the name, (2, 3), world frame."""
         return self.center + np.outer((-1.0, 1.0), (self.outer_m + _NAME_M) * self.axis)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class TurnRing:
-    """A ring about an axis that is open towards `away`, with a head at both ends."""
+    """A ring about an axis with a gap towards `away`, and an arrow head at both ends."""
 
     center: Array
     """(3,), world frame, [m]."""
     axis: Array
     """Unit vector, (3,), world frame."""
     away: Array
-    """(3,), world frame: where the ring is open."""
+    """(3,), world frame: direction of the gap."""
     radius_m: float
     color: _Color
     name: str = ""
@@ -67,21 +67,21 @@ class TurnRing:
 
     @property
     def tips(self) -> Array:
-        """Where the name of the ring may stand, (1, 3): at the opening, a little outside."""
+        """Possible position of the name, (1, 3), world frame: just outside the gap."""
         return (self.center - (self.radius_m + _NAME_M) * _frame(self)[0])[None]
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """What is drawn into a picture."""
+    """Arrows and rings to draw into a picture; pass it as `more` to a function that draws one."""
 
     marks: Sequence[ShiftArrows | TurnRing]
     opacity: float = 1.0
     """The opacity of the parts."""
 
     def __call__(self, scene: Any) -> None:
-        """Draw into an abstract scene of MuJoCo (`mjvScene`)."""
+        """Draw into MuJoCo's abstract scene (`mjvScene`)."""
         for geom in scene.geoms[: scene.ngeom]:
             if geom.category == mujoco.mjtCatBit.mjCAT_DYNAMIC:
                 geom.rgba[3] *= self.opacity
@@ -93,12 +93,14 @@ class Marks:
 
 
 def _shift(scene: Any, mark: ShiftArrows) -> None:
+    """Draw both arrows of a mark."""
     for side in (-1.0, 1.0):
         tail, tip = (mark.center + side * far * mark.axis for far in (mark.inner_m, mark.outer_m))
         _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, tail, tip, mark.color)
 
 
 def _turn(scene: Any, mark: TurnRing) -> None:
+    """Draw a ring as capsules, with an arrow at both ends."""
     u, v = _frame(mark)
     angles = np.linspace(-_SWEEP_RAD / 2, _SWEEP_RAD / 2, _PIECES + 1)
     points = mark.center + mark.radius_m * (np.outer(np.cos(angles), u) + np.outer(np.sin(angles), v))
@@ -110,9 +112,9 @@ def _turn(scene: Any, mark: TurnRing) -> None:
 
 
 def _frame(mark: TurnRing) -> tuple[Array, Array]:
-    """Two unit vectors across the axis, the first away from the opening."""
+    """Unit vectors (u, v) across the axis of a ring, (3,) each; u points away from the gap."""
     u = mark.away - (mark.away @ mark.axis) * mark.axis
-    if np.linalg.norm(u) < 1e-6:
+    if np.linalg.norm(u) < 1e-6:  # `away` is along the axis: any direction across it
         u = np.eye(3)[int(np.argmin(np.abs(mark.axis)))]
         u = u - (u @ mark.axis) * mark.axis
     u = -u / np.linalg.norm(u)
@@ -120,6 +122,7 @@ def _frame(mark: TurnRing) -> tuple[Array, Array]:
 
 
 def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: float = _WIDTH_M) -> None:
+    """Add a geom from point a to point b to the scene, unless it is full."""
     if scene.ngeom >= scene.maxgeom:
         return
     geom = scene.geoms[scene.ngeom]
@@ -133,11 +136,12 @@ def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: 
 
 
 def project_to_pixels(points: Array, camera: Any, fovy_deg: float, width: int, height: int) -> Array:
-    """Where points of the world, (k, 3), are in a picture by a free camera, (k, 2), from the upper left corner."""
+    """The pixels, (k, 2), of world points, (k, 3), in a picture by a free camera; origin at the upper left corner."""
     a = np.radians(camera.azimuth)
     e = np.radians(camera.elevation)
     forward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([np.sin(a), -np.cos(a), 0.0])
     ray = points - (camera.lookat - camera.distance * forward)
+    # pixels per metre at the depth of each point
     scale = height / 2 / np.tan(np.radians(fovy_deg) / 2) / (ray @ forward)
     return np.column_stack([width / 2 + scale * (ray @ right), height / 2 - scale * (ray @ np.cross(right, forward))])

@@ -1,4 +1,4 @@
-"""Draw pictures and films of a scene."""
+"""Render pictures and films of a scene, and show a replay in a window."""
 
 import weakref
 from collections.abc import Callable, Iterable
@@ -56,17 +56,17 @@ def picture_with_arm(
     camera: SceneCamera = "overview",
     more: Callable[[Any], None] | None = None,
 ) -> _Image:
-    """The parts where `poses` says, with the arm at home and its fingers open, (height, width, 3).
+    """Render the parts at given poses with the arm at home and its fingers open, (height, width, 3).
 
     Args:
-        state: `qpos` of a replay, which is then shown as it is; of `poses` only those of fixed parts count.
+        state: `qpos` of a replay to show as it is; then only the fixed parts' poses are taken from `poses`.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     return _draw(scene.work, build_data_with_arm(scene, poses, state), width, height, camera, more)
 
 
 def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
-    """What `picture_with_arm` shows, as `mujoco.MjData` of the scene where the robot works."""
+    """The `mujoco.MjData` of the replay world that `picture_with_arm` shows."""
     data = _at(scene.work, scene, poses)
     move_arm_home(scene, data)
     if state is not None:
@@ -82,14 +82,14 @@ def copy_data(data: Any, into: Any) -> None:
 
 
 def place_for_picture(model: Any, data: Any) -> None:
-    """Bring all that a picture shows up to date with the positions of a state: frames, centres of mass, cameras."""
+    """Update what a picture shows from the positions of a state: frames, centres of mass, cameras, lights."""
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)
 
 
 def move_arm_home(scene: Scene, data: Any) -> None:
-    """Put the arm at home in a state of its world, its fingers open."""
+    """Put the arm at home in a state of the replay world, with open fingers."""
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
         data.joint(f"arm/{joint}").qpos = q
     for finger, at in zip(scene.arm.fingers, scene.arm.finger_joints(scene.arm.opening_m), strict=True):
@@ -161,6 +161,7 @@ class Film:
         self._next = 0.0
 
     def __call__(self, data: Any) -> None:
+        """Keep an image if its time has come; `data` is a `mujoco.MjData`."""
         if data.time >= self._next:
             self.frames.append(self.shot(data))
             self._next = data.time + self._every - 1e-9
@@ -188,7 +189,7 @@ class Film:
 
 
 def check_film(path: Path) -> None:
-    """Refuse a film that cannot be written; a GIF needs no further package.
+    """Check that a film can be written; a GIF needs no further package.
 
     Raises:
         InputError: An ending other than .mp4 and .gif, or an MP4 without the package imageio-ffmpeg.
@@ -202,10 +203,10 @@ def check_film(path: Path) -> None:
 
 
 def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
-    """Write pictures as a film, MP4 or GIF by the ending.
+    """Write images as a film, MP4 or GIF by the ending.
 
     Raises:
-        InputError: As of `check_film`, or a place that cannot be written.
+        InputError: As of `check_film`, or a path that cannot be written.
     """
     import imageio.v3 as imageio
 
@@ -236,6 +237,7 @@ class ReplayWindow:
         self._window: Any = None
 
     def __call__(self, data: Any) -> None:
+        """Show a state in real time; the first call opens the window."""
         import time
 
         import mujoco.viewer
@@ -255,6 +257,7 @@ class ReplayWindow:
 def _draw(
     world: World, data: Any, width: int, height: int, camera: SceneCamera, more: Callable[[Any], None] | None = None
 ) -> _Image:
+    """Render one state of a world, (height, width, 3)."""
     _check_camera(world, camera)
     with renderer(world.model, width, height) as draws:
         draws.update_scene(data, camera=camera)
@@ -264,22 +267,24 @@ def _draw(
 
 
 def _check_camera(world: World, camera: SceneCamera) -> None:
+    """Raise an `InputError` if the scene has no camera of that name."""
     names = [world.model.camera(i).name for i in range(world.model.ncam)]
     if isinstance(camera, str):
         require_known("camera", camera, names, rest=" Or give the result of aim_camera.")
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
+    """A new state of a world with parts at `poses`, and parts that are not named at their starts."""
     data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
         set_part_pose(world, data, part, poses.get(part, scene.scenario.start[part]))
-    data.mocap_pos[:, 2] = -1.0
+    data.mocap_pos[:, 2] = -1.0  # hands are hidden below the table
     mujoco.mj_forward(world.model, data)
     return data
 
 
 def _release(renderer: Any) -> None:
-    """Close a renderer in its own context: in another's it would free that one's pictures."""
+    """Close a renderer in its own OpenGL context; in another one it would free that one's resources."""
     context = renderer._gl_context
     if context is not None:
         context.make_current()

@@ -1,4 +1,4 @@
-"""Compose the room, the parts and the arm into MuJoCo models, once per scenario, clearance and grasp."""
+"""Compile the MuJoCo models of a scenario, once per clearance, grasp, arm and time step (`Scene`)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,8 +20,10 @@ from apo_bench.simulation.scene.world import World, disable_wrist_sensors, world
 
 _Grasp = Literal["friction", "weld"]
 _DROWSY_M_S = 5e-5
-"""What moves slower for ten steps, and against nothing that moves, sleeps while a human demonstrates: parts that settle
-end within 2 micrometres of where they would."""
+"""Speed below which parts fall asleep during a demonstration.
+
+MuJoCo requires it for ten steps. Settling parts end within 2 micrometres of their pose without sleep.
+"""
 
 
 @final
@@ -120,9 +122,9 @@ def scene_xml(
     arm: str | Arm = "six_axis",
     timestep_s: float = 0.001,
 ) -> str:
-    """The replay scene as one MJCF text that opens in MuJoCo's viewer, every part at its start.
+    """The replay world as MJCF text that opens in MuJoCo's viewer, with every part at its start.
 
-    MuJoCo writes six digits; no model of the benchmark is made from such a text.
+    MuJoCo writes six digits, so the benchmark compiles no model from this text.
     """
     scene = build_scene(scenario, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s)
     room = room_with_parts(scenario, scene.clearance_mm, scene.physics)
@@ -132,6 +134,7 @@ def scene_xml(
 
 
 def _compiled(scenario: Scenario, spec: Any) -> World:
+    """Compile a world; MuJoCo must not reset an unstable simulation by itself, since the trial has to fail."""
     model = spec.compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return world(model, movable_parts(scenario), fixed_parts(scenario))

@@ -1,12 +1,12 @@
-"""The corrector `physics-settle` takes the poses at which observed parts come to rest.
+"""The corrector `physics-settle`: correct observed poses by letting the parts come to rest in a simulation.
 
-Operation by operation the main part is put where it was observed, with what it carries; then everything moves under
-gravity and contact, in the same soft contacts as replays, until it rests. The pose of the main part is the corrected
-one, and all parts stay where they came to rest. For the first `SOFT_S` the parts move as in syrup, so that those that
-were put inside each other part slowly instead of leaping.
+For each operation the main part, with what it carries, is put at its observed pose. Then everything moves under gravity
+and contact, in the same soft contacts as replays, until it rests. The corrected pose is that of the main part, and all
+parts stay where they came to rest. During the first `SOFT_S` all motion is strongly damped, so that parts that
+penetrate separate slowly instead of jumping.
 
-Physics knows neither which faces should touch nor how uncertain a pose is, so contacts and covariances are not looked
-at. Fit faces recede by the play that the observation states, or by `CLEARANCE_M`; all parts have one density.
+The simulation uses neither the contacts nor the covariances of the observation. Fit faces recede by the play that the
+observation states, or by `CLEARANCE_M`; all parts have the same density.
 """
 
 from collections.abc import Mapping
@@ -23,28 +23,28 @@ from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, get_part_pose, has_failed, make_initial_state, set_part_pose, world
 
 CLEARANCE_M = 0.25e-3
-"""Play per side of fit faces where none is stated, since parts without any cannot be put together."""
+"""Play per side of fit faces if none is stated; without any play parts cannot be joined."""
 _DENSITY = 600.0  # [kg/m^3], of wood, as in the part files
 _FRICTION = 0.8  # coefficient of sliding, of wood
-SOFT_S = 0.3  # parts move as in syrup so long
-_LONGEST_S = 1.5  # an operation ends at the latest
-_REST_S = 0.05  # rest must last so long
+SOFT_S = 0.3  # motion is strongly damped from the start of an operation for this time
+_LONGEST_S = 1.5  # longest simulation of an operation
+_REST_S = 0.05  # an operation ends after rest of this duration
 _SYRUP = 200.0
-"""Damping while parts move as in syrup, [1/s]: a part falls at 5 cm/s."""
+"""Strong damping, [1/s], with which a part falls at 5 cm/s."""
 _SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
 """Speed below which a part rests, [m/s, rad/s]."""
 _SLOW.flags.writeable = False
 
 
 def settle(observation: Observation) -> Correction | Array:
-    """Where the parts come to rest, (n, 4, 4), world frame, [m].
+    """Correct an observation to the poses at which the parts come to rest.
 
     Returns:
-        Bare goals, to be measured by the caller; a `Correction` with the status `not_seen` and unknown gaps where an
-        operation was not seen; what was seen, from the operation on at which the simulation became unstable.
+        (n, 4, 4), world frame, [m], if everything was observed; from the operation on at which the simulation becomes
+        unstable, the observed poses. Otherwise a `Correction` with status `not_seen` and unknown gaps.
     """
     if not observation.observed.all():
-        missing = int(np.argmin(observation.observed))
+        missing = int(np.argmin(observation.observed))  # the first operation that was not observed
         return Correction(
             observation.poses, "not_seen", describe_outcome("not_seen", operation=missing), (), np.nan, np.nan, 0
         )
@@ -66,17 +66,18 @@ def settle(observation: Observation) -> Correction | Array:
 
 
 def _put(scene: World, data: mujoco.MjData, moves: tuple[str, ...], T: Array) -> None:
-    """The main part at T, at rest, and what it carries along with it."""
+    """Put the main part, `moves[0]`, at T, (4, 4), at rest, together with the parts that it carries."""
     before = pose.inverse(get_part_pose(scene, data, moves[0]))
     for part in moves:
         set_part_pose(scene, data, part, T @ before @ get_part_pose(scene, data, part))
 
 
 def _rest(scene: World, data: mujoco.MjData) -> None:
-    """Step until no part has moved for a while."""
+    """Simulate until no part has moved for `_REST_S`, at most `_LONGEST_S`."""
     model = scene.model
     began = data.time
     quiet = 0.0
+    # (parts, 6): velocity indices of the free joints; `inertia` has masses and principal inertias in that order.
     dof = np.array(list(scene.dof.values()))[:, None] + np.arange(6)
     mujoco.mj_forward(model, data)
     inertia = np.array([[model.body_mass[b]] * 3 + [*model.body_inertia[b]] for b in map(scene.body.get, scene.free)])
@@ -89,7 +90,7 @@ def _rest(scene: World, data: mujoco.MjData) -> None:
 
 
 def _world(observation: Observation) -> World:
-    """The parts of an assembly as boxes, and nothing else; parts that no operation moves are fixed."""
+    """Compile the parts of an assembly without room and arm; parts that no operation moves are fixed."""
     moved = {part for operation in observation.assembly.operations for part in operation.moves}
     free = tuple(part for part in observation.assembly.solids if part in moved)
     fixed = tuple(part for part in observation.assembly.solids if part not in moved)
@@ -100,6 +101,7 @@ def _world(observation: Observation) -> World:
 
 
 def _room(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float, s: Physics) -> Any:
+    """The `MjSpec` of the parts, with fit faces receded by the clearance."""
     spec = mujoco.MjSpec()
     set_options(spec.option, s)
     set_contact([spec.default.geom], s)

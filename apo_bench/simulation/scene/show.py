@@ -1,4 +1,4 @@
-"""Images of a scenario: its parts at the start or assembled."""
+"""Render an image of a scenario: its parts at the start or assembled."""
 
 from pathlib import Path
 

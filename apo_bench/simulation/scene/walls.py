@@ -1,11 +1,10 @@
-"""Separate the walls of a hole from what is behind them, so that its part rests on few pieces.
+"""Separate the walls of a hole from the material behind them, so that a part rests on few pieces.
 
-A hole is cut into many wedges, each of which may reach to the outside of the part. A part that lies on a table would
-touch it with each of them, at four points. Here a wedge is cut in two: the wall, and what is behind it; the latter is
-joined to few pieces, and the walls stand back behind the flat faces by less than a round wall is away from its circle;
-so do those pieces where others carry a face. Of walls with something behind them two neighbours become one where its
-side, which touches the circle in the middle, is still near enough to the circle at its ends: a hole is nowhere narrower
-than it was.
+A hole consists of many wedges, each of which may reach to the outside of the part. A part on a table would touch it
+with every wedge, at four points each. So each wedge is cut into the wall and the material behind it, which is joined to
+few pieces. Walls stand back behind flat faces by less than a round wall deviates from its circle. So does the material
+behind where other pieces carry a face. Two neighbouring walls are joined if their common side, tangent to the circle in
+the middle, is near enough to the circle at its ends. The hole nowhere becomes narrower.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,42 +26,42 @@ from apo_bench.simulation.scene.hulls import (
 )
 
 COARSE_M = 2.5e-5
-"""A simulated wall is nowhere farther from its circle; hand and contact give way by as much in a step of 1 ms."""
+"""Largest distance of a simulated wall from its circle, as much as hand and contact yield in a step of 1 ms."""
 _THICK_M = 1e-3
-"""How thick a wall is, or half as thick as the part is there."""
+"""Thickness of a wall; half of the material's thickness if that is less."""
 _SECTORS = 4
-"""What is behind the walls of a hole becomes at least so many pieces."""
+"""Sectors around the axis of a hole; the material behind the walls becomes at least this many pieces."""
 _THINNEST_M = 5e-5  # nothing thinner is made
 _SMALLEST_M3 = 1e-12  # smaller pieces behind a wall are left out: MuJoCo takes no such mesh
 _LOST = 0.05
-"""Of two walls no more than this part is cut away where they become one."""
+"""Largest share of the volume that joining two walls may cut away."""
 
 
 class _Wall(NamedTuple):
-    """A wedge at a hole."""
+    """A wedge of a hole, and the plane that cuts it into the wall and the material behind."""
 
     hull: Hull
     face: RoundFace
     outwards: Array
     """Unit vector across the axis, from it to the middle of the wall, (3,)."""
     cut: Array
-    """The plane (n, d) that ends the wall: n . x <= d is the wall."""
+    """The plane (n, d) between wall and material behind: n . x <= d is the wall."""
     behind_m: float
-    """The cut is so far from the axis."""
+    """Distance of the cut from the axis."""
 
 
 @remember
 def linings(solid: Solid, clearance_m: float) -> Mapping[str, float]:
-    """Name of a wall that has something behind it -> how far from the axis of its hole that is, [m]."""
+    """Name of each wall with material behind it -> distance of that material from the axis of the hole, [m]."""
     walls = [wall for group in _groups(solid, clearance_m) for wall in group]
     return {wall.hull.name: wall.behind_m for wall in walls if _reaches_beyond(wall)}
 
 
 @remember
 def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
-    """The pieces of a part as they are simulated, by the name of the piece that they are cut from, if any is left.
+    """Name of each piece of a part -> the pieces that are simulated in its place; empty if none is left.
 
-    Remembered, since copies of a part, and the worlds of hands and of the arm, have the same.
+    Cached, since copies of a part and both worlds of a scene have the same pieces.
     """
     pieces = shrink_pieces(solid, clearance_m)
     nothing: Mapping[str, tuple[Piece, ...]] = {piece.name: () for piece in solid.pieces}
@@ -72,16 +71,19 @@ def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Pie
 
 
 def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
+    """`simulated_pieces` of a part with holes."""
     behind: list[Hull] = []
     walls: dict[str, Hull | None] = {}
     for group in _groups(solid, clearance_m):
         lining = [wall for wall in group if _reaches_beyond(wall)]
         walls |= {wall.hull.name: None if _reaches_beyond(wall) else wall.hull for wall in group}
+        # joined walls; the second of two stays None
         walls |= {hull.name: hull for hull in _coarser(lining, clearance_m)}
         behind += join_neighbours(clip_hull(wall.hull, -wall.cut) for wall in lining)
     behind = join_convex(behind)
     others = [p for p in pieces if isinstance(p, Hull) and p.cylinder is None and p.name not in walls]
     flats = [plane for plane in _flats(solid, clearance_m) if any(has_side(hull, plane) for hull in behind)]
+    # faces that other pieces carry, too
     carried = [plane for plane in flats if any(has_side(hull, plane) for hull in others)]
     cut: dict[str, tuple[Piece, ...]] = {piece.name: (piece,) for piece in pieces}
     for name, wall in walls.items():
@@ -94,7 +96,7 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
 
 @remember
 def _groups(solid: Solid, clearance_m: float) -> list[list[_Wall]]:
-    """The walls of all holes, those with the same cut together; each wedge is the wall of one hole."""
+    """The walls of all holes, grouped by equal cuts; each wedge is the wall of one hole only."""
     groups: list[list[_Wall]] = []
     left = list(shrink_pieces(solid, clearance_m))
     for face in solid.rounds.values():
@@ -107,18 +109,20 @@ def _groups(solid: Solid, clearance_m: float) -> list[list[_Wall]]:
 
 
 def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iterator[_Wall]:
-    """The wedges whose side is a wall of a hole, with where the wall ends."""
+    """The walls of one hole among the pieces: the wedges with a side on its surface."""
     wedges = []
     for piece in pieces:
         if not isinstance(piece, Hull) or piece.cylinder is not None:
             continue
         n = piece.planes[:, :3]
+        # Per side of the piece: direction away from the axis, and the tangent plane of the hole there.
         across = n - (n @ face.axis)[:, None] * face.axis
         far = np.linalg.norm(across, axis=1)
         outwards = -across / np.maximum(far, PARALLEL)[:, None]
         tangent = _tangents(face, outwards, clearance_m)
         on = (np.abs(n @ face.axis - tangent[:, :3] @ face.axis) < PARALLEL) & (far > PARALLEL)
         on &= np.abs(piece.planes[:, 3] - tangent[:, 3]) < ON_M
+        # Exactly one side on the surface: a wedge of this hole.
         if on.sum() == 1:
             wedges.append((piece, outwards[on][0], _sector(face, outwards[on][0])))
     if not wedges:
@@ -127,13 +131,13 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
     for hull, outwards, u in wedges:
         out = (hull.corners - face.point) @ u
         thick = min(_THICK_M, (float(out.max()) - widest) / 2)
-        # A piece may go on along the tangent, far from the wall: beside a pocket whose corners are rounded.
+        # A piece that lies only far beyond the wall is left whole, as beside a pocket with rounded corners.
         if thick > _THINNEST_M and out.min() < widest + thick:
             yield _Wall(hull, face, outwards, np.append(u, u @ face.point + widest + thick), widest + thick)
 
 
 def _tangents(face: RoundFace, outwards: Array, clearance_m: float) -> Array:
-    """Planes (n, d) of walls that touch a hole as it is made in these directions across its axis, (k, 3) -> (k, 4)."""
+    """Tangent planes (n, d) of a hole with its clearance, (k, 4), at directions across its axis, (k, 3)."""
     # A wall of a cone of slope k has the normal (-u, k) / sqrt(1 + k^2) in (outwards, along the axis), and touches the
     # cone. The clearance moves it along its normal, so the radius by clearance / w.
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
@@ -143,7 +147,7 @@ def _tangents(face: RoundFace, outwards: Array, clearance_m: float) -> Array:
 
 
 def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
-    """Walls without what is behind them, neighbours two by two as one where that is near enough to the circle."""
+    """Walls cut off from the material behind; neighbours are joined in pairs if near enough to the circle."""
     left = list(lining)
     while left:
         wall = left.pop(0)
@@ -155,6 +159,11 @@ def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
 
 
 def _as_one(a: _Wall, b: _Wall, first: Hull, clearance_m: float) -> Hull | None:
+    """Two neighbouring walls joined to one, tangent to the circle in the middle; None if too far from the circle.
+
+    Args:
+        first: Wall `a`, already cut off from the material behind.
+    """
     widest = max(a.face.radii) + clearance_m * a.face.fit
     cos = float(a.outwards @ b.outwards)
     if widest * (1.0 / max(cos, 0.1) - 1.0) > COARSE_M:
@@ -167,7 +176,7 @@ def _as_one(a: _Wall, b: _Wall, first: Hull, clearance_m: float) -> Hull | None:
 
 
 def _sector(face: RoundFace, outwards: Array) -> Array:
-    """The middle direction of the sector around the axis in which a direction lies."""
+    """The middle direction, (3,), of the sector around the axis that contains `outwards`."""
     x = face.frame[:3, 0]
     y = face.frame[:3, 1]
     turn = 2.0 * np.pi / _SECTORS
@@ -176,7 +185,7 @@ def _sector(face: RoundFace, outwards: Array) -> Array:
 
 
 def _sectors(walls: Sequence[_Wall]) -> Iterator[list[_Wall]]:
-    """Walls with the same cut, neighbours next to each other."""
+    """Groups of walls with the same cut, each sorted so that neighbours are adjacent."""
     left = list(walls)
     while left:
         first = left[0].cut
@@ -189,10 +198,10 @@ def _sectors(walls: Sequence[_Wall]) -> Iterator[list[_Wall]]:
 
 
 def _reaches_beyond(wall: _Wall) -> bool:
-    """Whether anything is behind a wall that is thicker than the thinnest that is made."""
+    """Whether the material behind a wall is thick enough to become a piece."""
     return bool((wall.hull.corners @ wall.cut[:3] - wall.cut[3]).max() > _THINNEST_M)
 
 
 def _flats(solid: Solid, clearance_m: float) -> list[Array]:
-    """The planes (n, d) of the flat faces as they are made."""
+    """The planes (n, d) of the flat faces, with clearance."""
     return [np.append(f.normal, f.normal @ f.outline[0] - clearance_m * f.fit) for f in solid.faces.values()]

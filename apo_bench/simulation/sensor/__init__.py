@@ -1,1 +1,1 @@
-"""A simulated TV camera and a simulated range finder that watch a demonstration."""
+"""A simulated TV camera and a simulated range finder that record a demonstration."""

@@ -1,4 +1,4 @@
-"""What rays strike in a simulated scene, by `mj_multiRay` and without any graphics."""
+"""Ray casting in a scene by MuJoCo's `mj_multiRay`, without rendering: for range images and for matching of models."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, final
@@ -13,40 +13,44 @@ from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
 
 _AWAY_M = -5.0
-"""Hands are put this deep below the floor before a picture is taken."""
-_FARTHEST_M = 100.0
+"""Height, below the floor, at which hands are hidden from every image."""
+_FARTHEST_M = 100.0  # greatest length of a ray
 _NOWHERE_M = 1e4
-"""Models that are not there are farther away than any ray goes."""
+"""Coordinates of absent models, farther away than any ray reaches."""
 
 
 class Strikes(NamedTuple):
-    """The ends of n rays."""
+    """The first surface that each of n rays hits."""
 
     distance: Array
-    """(n,), [m], infinite where nothing is."""
+    """Distance, (n,), [m]; infinite for a ray that hits nothing."""
     normal: Array
-    """(n, 3), world; zero where nothing is."""
+    """Surface normal, (n, 3), world; zero for a ray that hits nothing."""
     geom: NDArray[np.int32]
-    """(n,), -1 where nothing is."""
+    """Geom id, (n,); -1 for a ray that hits nothing."""
 
 
 def cast_rays(model: Any, data: Any, origin: Array, rays: Array) -> Strikes:
-    """Send rays (n, 3) from one point (3,) through a scene as it stands."""
+    """Cast rays with unit directions, (n, 3), from one point, (3,), through the present scene.
+
+    The poses of its geoms must be up to date (`mj_kinematics`).
+    """
     n = len(rays)
     geom = np.empty(n, np.int32)
     distance = np.empty(n)
     normal = np.zeros(3 * n)
     ways = np.ascontiguousarray(rays).reshape(-1)
+    # No geom group and no body is excluded (None, -1); static geoms are included (True).
     mujoco.mj_multiRay(model, data, origin, ways, None, True, -1, geom, distance, normal, n, _FARTHEST_M)
     return Strikes(np.where(geom < 0, np.inf, distance), normal.reshape(-1, 3), geom)
 
 
 @final
 class Sight:
-    """A scene as a camera meets it: the poses of the moment, and no hands.
+    """A copy of the scene for cameras, with the present poses of the parts and without hands.
 
-    The simulated hands are balls without arms that stay where they let go. A person takes the hands out of the picture;
-    here they are left out of every picture. It has data of its own, so the state of the simulation stays as it is.
+    The simulated hands are balls without arms that stay where they released a part. A person would take the hands out
+    of the picture; here they are left out of every picture. The copy leaves the state of the simulation as it is.
     """
 
     def __init__(self, world: World) -> None:
@@ -54,17 +58,17 @@ class Sight:
         self._own = mujoco.MjData(world.model)
 
     def look(self, qpos: Array) -> None:
-        """Put all parts where a simulation has them."""
+        """Set the poses of all parts from the `qpos` of a simulation."""
         self._own.qpos[:] = qpos
         self._own.mocap_pos[:, 2] = _AWAY_M
         mujoco.mj_kinematics(self._model, self._own)
 
     def strike(self, view: PinholeView) -> Strikes:
-        """Send out all rays of a view."""
+        """Cast the rays of all pixels of a view."""
         return cast_rays(self._model, self._own, view.origin, view.rays)
 
     def range_image(self) -> RangeImage:
-        """True distances in every view of the range finder."""
+        """Return the true distances, and the cosines of incidence, in every view of the range finder."""
         shape = (len(VIEWS), VIEWS[0].height, VIEWS[0].width)
         strikes = [self.strike(view) for view in VIEWS]
         cosine = [
@@ -76,9 +80,10 @@ class Sight:
 
 @final
 class ModelRays:
-    """A `RayCaster`: models of parts and nothing else, wherever they are put."""
+    """A `RayCaster` for models of parts at any poses, without anything else."""
 
     def __init__(self, solids: Mapping[str, Solid], play_m: float) -> None:
+        """Build one movable body for each part, its fits shrunk by the clearance `play_m`."""
         spec = mujoco.MjSpec()
         for part, solid in solids.items():
             body = spec.worldbody.add_body(name=part, mocap=True)
@@ -87,11 +92,22 @@ class ModelRays:
         self._data = mujoco.MjData(self._model)
         bodies = [self._model.body(part) for part in solids]
         self._mocap = {part: int(body.mocapid[0]) for part, body in zip(solids, bodies, strict=True)}
+        # Geom id -> mocap id; index -1, of a ray that hits nothing, is the last entry.
         self._mocap_of = np.append(self._model.body_mocapid[self._model.geom_bodyid], len(solids))
 
     def __call__(self, poses: Mapping[str, Array], origin: Array, rays: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Cast rays at models of parts.
+
+        Args:
+            poses: Poses of the parts that are present, (4, 4) each, world.
+            origin: (3,), world, [m].
+            rays: Unit directions, (n, 3), world.
+
+        Returns:
+            Distances, (n,), [m], infinite without a hit, and indices into `poses` of the parts hit, (n,), -1 without.
+        """
         self._data.mocap_pos[:] = _NOWHERE_M
-        number = np.full(len(self._mocap) + 1, -1)
+        number = np.full(len(self._mocap) + 1, -1)  # mocap id -> index into `poses`
         for i, (part, T) in enumerate(poses.items()):
             k = self._mocap[part]
             number[k] = i

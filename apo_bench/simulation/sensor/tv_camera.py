@@ -1,4 +1,4 @@
-"""A TV camera of low resolution: what it sees, in grey, and whether that has changed."""
+"""A grey TV camera of low resolution that detects whether the scene changes, to find when a demonstration pauses."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -11,51 +11,53 @@ from apo_bench.perception.depth_camera.range_finder import VIEWED_POINT_M, Pinho
 from apo_bench.simulation.sensor.rays import Strikes
 
 _LIGHT = np.array([0.25, -0.35, 1.0]) / np.linalg.norm([0.25, -0.35, 1.0])
-"""Where the light comes from: that of the room."""
-_AMBIENT = 0.4
-_LUMA = np.array([0.299, 0.587, 0.114])
-_BACKGROUND = 0.9
+"""Unit vector towards the light, world."""
+_AMBIENT = 0.4  # share of ambient light
+_LUMA = np.array([0.299, 0.587, 0.114])  # weights of red, green and blue in the brightness
+_BACKGROUND = 0.9  # brightness where a ray hits nothing
 
 
 @lru_cache(maxsize=1)
 def _front_view() -> PinholeView:
-    """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
+    """Return an oblique view from the front of 160 x 120 pixels, each 6 mm wide."""
     return PinholeView(look_at((0.85, -0.35, 0.75), VIEWED_POINT_M), 160, 120, 45.0)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class TvCamera:
-    """How it sees, and when it calls something a change."""
+    """View, noise and thresholds of the TV camera."""
 
     view: PinholeView = field(default_factory=_front_view)
     noise: float = 2.0 / 255.0
     """Standard deviation of the brightness of a pixel, where white is 1."""
     changed: float = 12.0 / 255.0
-    """A pixel differs if its brightness does by more: four standard deviations of a difference."""
+    """Difference of brightness from which a pixel has changed: four standard deviations of a difference."""
     share: float = 0.0004
-    """A picture differs if more than this share of its pixels does: seven, where noise alone makes less than one."""
+    """Fraction of changed pixels from which a picture has changed: seven pixels; noise alone changes less than one."""
     quiet_s: float = 0.15
-    """The scene is quiet if pictures have not differed for so long."""
+    """Time without a change after which the scene is quiet."""
     late_s: float = 0.1
-    """A motion that begins slowly is seen so much later at most."""
+    """Greatest delay until a motion that begins slowly is detected."""
     period_s: float = 0.05
-    """Between two pictures."""
+    """Time between two pictures."""
 
     def brightness(self, strikes: Strikes, rgba: Array) -> Array:
-        """The picture without noise, (n,): Lambert's law, one light, the colours of the geoms.
+        """Return the brightness of n pixels without noise, (n,): Lambert's law with one light.
 
         Args:
-            rgba: (geoms, 4).
+            strikes: The hits of the pixels' rays.
+            rgba: Colours of the geoms, (geoms, 4).
         """
         lit = _AMBIENT + (1.0 - _AMBIENT) * np.maximum(strikes.normal @ _LIGHT, 0.0)
+        # The appended entry is that of geom -1, nothing.
         grey = np.append(rgba[:, :3] @ _LUMA, _BACKGROUND)[strikes.geom]
         return np.where(strikes.geom < 0, _BACKGROUND, grey * lit)
 
 
 @final
 class Change:
-    """Compares pictures one after the other: is the scene quiet?"""
+    """A change detector that is given one picture after the other."""
 
     def __init__(self, camera: TvCamera) -> None:
         self._camera = camera
@@ -63,9 +65,12 @@ class Change:
         self._since = 0.0
 
     def quiet(self, picture: Array, time_s: float) -> bool:
-        """Take one more picture; whether nothing has changed for `quiet_s`.
+        """Process the next picture; return whether the scene has not changed for `quiet_s`.
 
-        Pictures are compared with the one at the last change, so that slow motions add up until they are seen.
+        Pictures are compared with that of the last change, so that slow motions add up until they are detected.
+
+        Args:
+            picture: Brightness of the pixels, (n,), with noise.
         """
         if self._reference is None or self._differs(picture, self._reference):
             self._reference = picture
@@ -73,4 +78,5 @@ class Change:
         return time_s - self._since >= self._camera.quiet_s - 1e-9
 
     def _differs(self, picture: Array, reference: Array) -> bool:
+        """Whether the fraction of changed pixels between two pictures exceeds `share`."""
         return bool(np.mean(np.abs(picture - reference) > self._camera.changed) > self._camera.share)

@@ -1,6 +1,6 @@
 """Prepare the start of an episode, at which the robot holds the part before its hole.
 
-A start is a state of the physics and what the robot knows; made once, it is restored as often as wanted.
+A start contains the state of the physics and of the controller, so episodes can restore it any number of times.
 """
 
 from dataclasses import dataclass, replace
@@ -40,43 +40,49 @@ from apo_bench.simulation.scene import Scene, allow_sleep
 @final
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One start; nothing changes it."""
+    """The start of an episode; episodes do not change it."""
 
     operation: int
-    """Counted from 0."""
+    """The operation, counted from 0."""
     parts: Poses
-    """Where the parts stood at first."""
+    """Poses of the parts at the beginning of the plan."""
     transfer: Transfer
-    """With the errors of the robot in its poses: where the robot really goes."""
+    """The transfer with the errors of the robot in its poses: where the robot really goes."""
     grip: Grip
+    """The grip in use."""
     second: Grip | None
-    """The grip after the guarded motion, if it is changed then."""
+    """The grip after the guarded motion; None if it does not change."""
     direction: Array
     """The insertion axis by the robot's own estimate, unit vector, (3,), world."""
     off: Array
-    """(joints,), by how much each joint is off its encoder, [rad]."""
+    """True minus measured joint angles, (joints,), [rad]."""
     saved: SavedState
+    """The state of the physics and the controller."""
     wrist: WristSensor
-    """Zeroed here."""
+    """The wrist sensor, tared; episodes copy it by `WristSensor.at`."""
     after: tuple[Snapshot | None, ...]
-    """After each operation before."""
+    """A snapshot after each earlier operation."""
 
 
 def prepare_start(
     plan: Plan, scene: Scene, k: int, config: ExecutionConfig, sensor: tuple[str, tuple[int, ...]]
 ) -> Start | Outcome:
-    """Execute a plan up to where the guarded motion of an operation begins; or return what failed before.
+    """Execute a plan up to where the guarded motion of an operation begins.
 
     Args:
-        k: The operation, counted from 0; the last time that it is done.
-        config: How the robot executes it; it skips free motions and searches for holes anyway.
-        sensor: The force-torque sensor at the wrist, by name, and the seed of its noise.
+        k: The operation, counted from 0; if the schedule repeats it, the last time.
+        config: How the robot executes the plan; fidelity is always `near-contact`, and `spiral` is always on.
+        sensor: Name of the force-torque sensor at the wrist, and the seed of its noise.
+
+    Returns:
+        The start, or the outcome if an earlier step failed.
     """
     at = max(i for i, step in enumerate(plan.schedule) if step.operation == k and not step.undo)
     config = replace(config, fidelity="near-contact", spiral=True)
     robot = Robot(scene, plan.start, Hooks(), config.fidelity, config.robot_error)
     execution = Execution(plan, robot, config)
     with allow_sleep(scene.work, scene.grasp == "friction"):
+        # The keys only have to differ: the cache is new, so nothing is found in it.
         outcome = execution.run(execution.moves()[:at], ReplayCache(), [b"%d" % i for i in range(2 * at)])
         if outcome.failed:
             return outcome
@@ -91,11 +97,17 @@ def prepare_next_start(
     error: RobotError | None,
     sensor: tuple[str, tuple[int, ...]],
 ) -> Start | Outcome:
-    """The start of the next operation, by the robot that has just released a part; as `prepare_start`, without probing.
+    """Prepare the start of the next operation after an agent has released a part; without probing.
 
     Args:
-        robot: As an agent has moved it from `start`; it is left as it is.
-        reached: What it has reached.
+        robot: The robot as the agent has moved it from `start`; its controller stays unchanged.
+        start: The start of the present operation.
+        reached: The snapshot after this operation.
+        error: The errors of the robot.
+        sensor: As for `prepare_start`.
+
+    Returns:
+        The start, or the outcome if picking or carrying the part failed.
     """
     config = ExecutionConfig("near-contact", spiral=True, robot_error=error)
     execution = Execution(plan, Robot(robot.scene, start.parts, Hooks(), config.fidelity, error), config)
@@ -106,11 +118,11 @@ def prepare_next_start(
 
 
 def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]]) -> Start | Outcome:
-    """Pick the part of a move and hold it before its hole."""
+    """Pick the part of a move, carry it to before its hole, and tare the wrist sensor there."""
     robot = execution.robot
     robot.step, t = move
     k = robot.step.operation
-    if not t.into.level and t.entrances:
+    if not t.into.level and t.entrances:  # from above, every entrance is passed slowly
         t = replace(t, in_last=True, slow=max(t.slow, max(t.entrances) + WALL_MARGIN_M))
     try:
         with robot.watch_stability():
@@ -123,7 +135,7 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
         return Outcome(
             aborted.stage, aborted.code, k, describe_outcome(aborted.code, part=aborted.part or t.part, operation=k)
         )
-    left = execution.residual
+    left = execution.residual  # errors that remain after compensation
     return Start(
         operation=k,
         parts=dict(execution.plan.start),
@@ -133,11 +145,12 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
         direction=t.into.direction if left is None else left.hand_eye[:3, :3].T @ t.into.direction,
         off=np.zeros(len(robot.scene.arm.joints)) if left is None else left.joints,
         saved=save_state(robot, i, execution.progress),
+        # A template without a robot: each episode connects it to its own simulation.
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _no_encoders, np.random.default_rng(0)),
         after=tuple(execution.progress.after[:k]),
     )
 
 
 def _no_encoders() -> Array:
-    """The encoders of no robot."""
+    """Stand for the encoders in a wrist sensor that is not connected to a robot."""
     return np.zeros(0)

@@ -1,7 +1,7 @@
-"""Control the tip of the arm between two actions of an agent.
+"""Control the tip of the arm during an episode: add the actions of an agent to a compliant approach into the hole.
 
-The robot knows what it commands, its encoders, its opening, the force on the part in its hand and the wrench at its
-wrist; nothing here reads where a part is.
+The robot knows its commands, its encoders, the opening of its fingers, the force on the held part and the wrench at its
+wrist. No command depends on the true pose of a part.
 """
 
 import math
@@ -29,92 +29,91 @@ from apo_bench.simulation.scene import Scene, allow_sleep, get_part_pose, switch
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
-"""From one action to the next: 20 Hz."""
+"""Time between two actions: 20 Hz."""
 _YIELD = 0.0005
-"""How fast the tip gives way to a newton, [m/s/N], as in a search."""
+"""Admittance of the tip, [m/s/N], as in a search."""
 _AVERAGED_S = 0.01
-"""Forces are averaged over this time."""
-_GAIN = 0.6  # [m/s^2]: how fast the approach gains speed in free air
-_SOFT = 0.02  # [m/s^2]: and after a first touch
-_FEED = 0.005  # [m/s]: its greatest speed once it was stopped
-_EASE = 0.02  # [m/s]: and deeper than that by `_DEEP_M`
-_DEEP_M = 0.001
-_MET = 0.8
-"""The light push is met from this part of it on."""
+"""Time constant of the force filter."""
+_GAIN = 0.6  # acceleration of the approach in free air, [m/s^2]
+_SOFT = 0.02  # acceleration of the approach after its first contact, [m/s^2]
+_FEED = 0.005  # greatest speed of the approach after its first contact, [m/s],
+_EASE = 0.02  # and once it is deeper than this contact by `_DEEP_M`, [m/s]
+_DEEP_M = 0.001  # depth beyond the first contact from which the part is in the hole
+_MET = 0.8  # fraction of the light push from which the approach controls the force
 _STRUCK = 0.03
-"""Faster than this, [m/s], it stops by the force of a single step; else by the average."""
-_ACROSS_M = 0.015  # actions move the tip off the line of the approach by this at most
-_TURN_RAD = math.radians(10.0)  # and turn it by this
-_BACK_M = 0.01  # behind its start by this
-_BEYOND_M = 0.003  # and beyond the end of the line by this
-_ARRIVED_M = 0.0002  # the approach has arrived this near to its end
-_PUSHED = 4  # or pushed back at so many actions in a row
-_NEAR_M = 0.002  # and this near
+"""Speed above which the force of a single step stops the approach, [m/s]; below, the filtered force does."""
+_ACROSS_M = 0.015  # greatest lateral offset of the tip from the line of the approach
+_TURN_RAD = math.radians(10.0)  # greatest turn by the actions, about each axis
+_BACK_M = 0.01  # greatest distance of the tip behind its start
+_BEYOND_M = 0.003  # greatest distance of the tip beyond the end of the line
+_ARRIVED_M = 0.0002  # distance to its end at which the approach has arrived;
+_PUSHED = 4  # it has also arrived if it was pushed back at this number of actions in a row
+_NEAR_M = 0.002  # within this distance of its end, or that of `Transfer.stuck`
 
 
 class TipReading(NamedTuple):
-    """What the robot knows after an action, in the frame of the insertion axis, its third axis."""
+    """The measurements of the robot after an action, in a frame whose third axis is the insertion axis."""
 
     tip: Array
-    """(6,), measured less where the line ends, [m, rad]: of the estimated front of the part, and its turn."""
+    """Measured pose less that at the end of the line, (6,), [m, rad]: position of the part's estimated front, turn."""
     lag: Array
-    """(6,), commanded less measured, [m, rad]."""
+    """Commanded less measured pose, (6,), [m, rad]."""
     opening: float
-    """Of each finger less half the width of the part, [m]."""
+    """Opening of each finger less half the width of the part, [m]."""
     wrench: Array
-    """(6,), on the hand and what is in it, about the flange, [N, Nm]."""
+    """External wrench on the hand and the held parts, about the flange, (6,), [N, Nm]."""
 
 
 @final
 class TipControl:
-    """One episode: the arm from its start until it lets go."""
+    """The arm during one episode, from its start to the release of the part."""
 
     def __init__(self, scene: Scene, start: Start, rng: np.random.Generator, nominal: bool = True) -> None:
-        """Take up a start.
+        """Restore a start in a new simulation.
 
         Args:
-            rng: Of the noise of the wrist.
-            nominal: Whether the arm goes in by itself, and actions are added to that.
+            rng: Source of the noise of the wrist sensor.
+            nominal: Whether the arm approaches the goal by itself, and actions are added to this motion.
         """
         self.start = start
         self.nominal = nominal
         self.arrived = False
-        """Whether the approach is over and would let go."""
+        """Whether the approach is over, so that the part would be released."""
         self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
         robot.compensate(start.off)
         restore_state(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
-        self._end = find_attach_end(t, start.grip, start.second)
-        self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]
-        self._R = frame_of_direction(t.into.direction, self._end)
+        self._end = find_attach_end(t, start.grip, start.second)  # tip pose at the end of the line
+        self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]  # in the frame of the tip
+        self._R = frame_of_direction(t.into.direction, self._end)  # frame of the insertion axis, in the world
         self._pace = choose_pace(t, start.second)
         self._guard = t.insert_n if t.into.level else t.place_n
-        self._left = 0.0 if start.second is None else float(t.into.left or 0.0)
+        self._left = 0.0 if start.second is None else float(t.into.left or 0.0)  # end of the line to the goal, [m]
         self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
         self._filtered = LowPass(_AVERAGED_S)
         self._force = robot.forces.net()
-        self._speed = 0.0
-        self._stopped: float | None = None
-        self._pushed = 0
-        self._passed = 0
-        self._turn: Array = np.zeros(3)
-        self._at: Array = self._off(robot.T)[:3]
+        self._speed = 0.0  # of the approach, [m/s]
+        self._stopped: float | None = None  # distance to the goal at the first contact, [m]
+        self._pushed = 0  # number of actions in a row with a push back
+        self._passed = 0  # number of physics steps
+        self._turn: Array = np.zeros(3)  # sum of the turns by actions
+        self._at: Array = self._off(robot.T)[:3]  # position of the front by linear kinematics, off the line's end
         self.begins = -float(self._at[2])
-        """How far before the end of the line it begins, [m]."""
+        """Distance of the start before the end of the line, [m]."""
         with self._stepping():
             self.reading = self._read()
 
     def act(self, shift: Array, turn: Array) -> None:
-        """One period: move the tip by the action, and go on with the approach.
+        """Simulate one period: move the tip by the action, and continue the approach.
 
         Args:
-            shift: (3,), of the front of the part in the frame of the way in, [m].
-            turn: (3,), a rotation vector about the front in that frame, [rad].
+            shift: Shift of the front of the part, (3,), in the frame of the insertion axis, [m].
+            turn: Rotation vector about the front, (3,), in the same frame, [rad].
 
         Raises:
-            ExecutionAborted: Something was struck, or fell out of the hand.
+            ExecutionAborted: The arm collided, or the part fell out of the hand.
         """
         with self._stepping():
             self._move(shift, turn)
@@ -122,10 +121,13 @@ class TipControl:
             self.reading = self._read()
 
     def let_go(self) -> Snapshot:
-        """Open the fingers, do what the operation still has after an approach that arrived, and wait until parts rest.
+        """End the episode: finish the operation if the approach arrived, else release the part; then wait for rest.
+
+        Returns:
+            The snapshot of the parts at rest.
 
         Raises:
-            ExecutionAborted: Something went wrong; what was reached then is never judged.
+            ExecutionAborted: Something went wrong; the poses reached are then not judged.
         """
         robot = self.robot
         t = self.start.transfer
@@ -133,6 +135,7 @@ class TipControl:
         with allow_sleep(work, robot.scene.grasp == "friction"), robot.watch_stability():
             robot.stand()
             if self.arrived:
+                # The tip pose shifted along the axis to the depth of the end of the line.
                 at_end = translate(robot.T, t.into.direction, -float(self._off(robot.T)[2]))
                 finish_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
             else:
@@ -142,10 +145,10 @@ class TipControl:
             return take_snapshot(work, robot.data, self.start.parts)
 
     def sigmas(self, covariance: Array) -> Array:
-        """Standard deviations in the frame of the way in, of the front and of the turn, (6,), [m, rad].
+        """Return the standard deviations of front and turn in the frame of the insertion axis, (6,), [m, rad].
 
         Args:
-            covariance: (6, 6), of the twist of the part in its own frame, [m, rad].
+            covariance: Covariance of the pose of the part, (6, 6), as a twist in its own frame, [m, rad].
         """
         t = self.start.transfer
         R = self._R.T @ t.T_world_goal[:3, :3]
@@ -154,9 +157,16 @@ class TipControl:
         return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
 
     def off(self, goals: Sequence[Array]) -> Array:
-        """By how much the front of the part, and its turn, are off the lines to such poses of it, (6,), [m, rad].
+        """Return the true offset of the part from the lines to its goals, averaged over the goals, (6,), [m, rad].
 
-        The mean, in the frame of the way in; the third number is less than 0 before the end. For observers, as `poses`.
+        For observers only, as `poses`.
+
+        Args:
+            goals: Goal poses of the part, (4, 4) each, world: one relative to each neighbouring part.
+
+        Returns:
+            Offset of the front, two lateral numbers and one along the axis, negative before the goal; then the turn as
+            a rotation vector. All are in the frame of the insertion axis.
         """
         t = self.start.transfer
         T = get_part_pose(self.robot.scene.work, self.robot.data, t.part)
@@ -164,24 +174,25 @@ class TipControl:
         found = []
         for goal in goals:
             direction = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.direction
-            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]
+            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]  # offset of the front
             turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
             across = (far - (far @ direction) * direction) @ self._R
             found.append([*across[:2], far @ direction, *turn @ self._R])
         return np.asarray(np.mean(found, axis=0))
 
     def poses(self) -> Poses:
-        """Where all parts are, (4, 4) each, world: for observers; nothing is decided by it."""
+        """Return the true poses of all parts, (4, 4) each, world, for observers only; no command depends on them."""
         work = self.robot.scene.work
         return {**self.start.parts, **{part: get_part_pose(work, self.robot.data, part) for part in work.free}}
 
     @property
     def force_n(self) -> float:
-        """On what is in the hand, behind a filter of 8 Hz, [N]."""
+        """Magnitude of the contact force on the held parts behind a filter of 8 Hz, [N]."""
         return math.hypot(*self.robot.forces.wrist.force)
 
     @contextmanager
     def _stepping(self) -> Iterator[None]:
+        """Within this context physics steps are taken: wrist sensors on, sleeping as allowed, stability watched."""
         robot = self.robot
         work = robot.scene.work
         asleep = allow_sleep(work, robot.scene.grasp == "friction")
@@ -189,6 +200,10 @@ class TipControl:
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:
+        """Simulate the physics steps of one period and update `arrived`; arguments as for `act`.
+
+        The tip velocity at each step is the sum of the action, the approach and the admittance to the contact force.
+        """
         robot = self.robot
         dt = robot.step_s
         steps = round(PERIOD_S / dt)
@@ -197,7 +212,7 @@ class TipControl:
         off = self._off(T)
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
-        # What the linear kinematics of the last period left behind is made up for.
+        # Velocity of the front by the action, world; it also corrects the linearisation error of the last period.
         wanted = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
         from_there = off[:3]
         moved = np.zeros(3)
@@ -220,29 +235,40 @@ class TipControl:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
                 struck = -float(np.dot(self._force, direction)) if self._speed > _STRUCK else push
                 if self._stopped is None and max(struck, side) > self._guard:
+                    # First contact: continue from the measured joint angles, which takes the pressure away.
                     q = robot.encoders()
                     from_there = self._off(robot.scene.kinematics.forward(q))[:3]
                     moved = np.zeros(3)
                     self._speed, self._stopped = 0.0, left
                 advance = wanted + self._ahead(left, push, side, dt) * direction
-                yields = yields + _YIELD * push * direction
+                yields = yields + _YIELD * push * direction  # lateral only: `_ahead` controls the force along the axis
             moved = moved + dt * (advance + yields)
             left = self._left - float(from_there[2] + moved @ direction)
-            leads = turning + shifting @ advance
+            leads = turning + shifting @ advance  # joint velocities for the feedforward
             q = q + dt * (leads + shifting @ yields)
             self._passed += 1
             self._force = robot.servo_step(q, self._passed, leads)
             self._wrist.take(dt)
-        self._at = from_there + moved @ self._R
+        self._at = from_there + moved @ self._R  # rows times R: from the world to the frame of the axis
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
         push = -float(np.dot(self._filtered.force, direction))
         self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
-        here = left - self._pace.end
+        here = left - self._pace.end  # distance to the end of the motion
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
     def _ahead(self, left: float, push: float, side: float, dt: float) -> float:
-        """How fast the approach goes on, [m/s], so far before the goal, [m]: as it may, or under a light push."""
+        """Return the speed of the approach at this step, [m/s].
+
+        Before the first contact it rises to the speed limit. Afterwards the approach keeps a light push of
+        `Transfer.slide_n` in contact, and moves ahead slowly without contact.
+
+        Args:
+            left: Distance to the goal, [m].
+            push: Filtered force against the direction, [N].
+            side: Filtered lateral force, [N].
+            dt: Physics step, [s].
+        """
         weigh = self.start.transfer.slide_n
         if self._stopped is None:
             self._speed = min(self._speed + _GAIN * dt, self._limit(left))
@@ -255,7 +281,10 @@ class TipControl:
         return self._speed
 
     def _limit(self, left: float) -> float:
-        """The speed from which slow stretches are reached slowly: v^2 = v_slow^2 + 2 a d."""
+        """Return the greatest speed at a distance to the goal, [m/s], that allows braking before slow stretches.
+
+        At a distance d before a stretch, v^2 = v_slow^2 + 2 a d with the acceleration a.
+        """
         most = min(self._pace.quick, math.sqrt(2 * _GAIN * max(left - self._pace.end, 0.0)))
         for begin, end, slow in self._pace.stretches:
             if left > begin:
@@ -265,12 +294,16 @@ class TipControl:
         return most
 
     def _off(self, T: Array) -> Array:
-        """Where a tip pose is, less where the line ends, (6,), in the frame of the way in, [m, rad]; of the front."""
+        """Return the offset of a tip pose from the end of the line, (6,), in the frame of the insertion axis, [m, rad].
+
+        The first three numbers are the shift of the front of the part, the others a rotation vector.
+        """
         shift = pose.apply(T, self._front[None])[0] - pose.apply(self._end, self._front[None])[0]
         turn = pose.log(pose.rigid(T[:3, :3] @ self._end[:3, :3].T, np.zeros(3)))[3:]
         return np.concatenate([shift @ self._R, turn @ self._R])
 
     def _read(self) -> TipReading:
+        """Return the present measurements."""
         robot = self.robot
         tip = self._off(robot.scene.kinematics.forward(robot.encoders()))
         wrench = self._wrist.wrench_there().reshape(2, 3) @ self._R
@@ -278,9 +311,14 @@ class TipControl:
 
 
 def frame_of_direction(direction: Array, T_tip: Array) -> Array:
-    """A frame whose third axis leads along a way, as columns in the world, (3, 3).
+    """Return a rotation matrix, (3, 3), whose third column is a direction in the world.
 
-    The first axis is that along which the fingers close, as far as it is square to the way.
+    Its first column is the closing direction of the fingers, made perpendicular to the direction. If both are within 45
+    degrees, the y axis of the tip is used instead.
+
+    Args:
+        direction: Unit vector, (3,), world.
+        T_tip: Pose of the tip, (4, 4), world.
     """
     first = T_tip[:3, 0] if abs(T_tip[:3, 0] @ direction) < 0.7 else T_tip[:3, 1]
     first = first - (first @ direction) * direction

@@ -14,7 +14,7 @@ from tests.benchmark.analysis.test_rates import row
 
 def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
     """What calibration looks at in the row of a corrector with a test."""
-    said = {"consistency_passes": passes, "p_value": 0.5 if passes else 1e-6, "suspects": list(suspects)}
+    said = {"consistent": passes, "p_value": 0.5 if passes else 1e-6, "suspects": list(suspects)}
     errors = {"planned_error_fixed_mm": 0.3 + 0.1 * seed, "planned_error_free_mm": 2.0, "inside_95": seed > 0}
     return row("contact", seed=seed) | said | errors | more
 

@@ -22,7 +22,7 @@ from tests import pages
 
 UNKNOWN = dict.fromkeys(
     (
-        *("chi_square", "chi_square_dof", "p_value", "consistency_passes", "suspects", "dropped", "wrong_contact"),
+        *("chi_square", "chi_square_dof", "p_value", "consistent", "suspects", "dropped_contacts", "wrong_contact"),
         *("inside_95", "planned_error_fixed_mm", "planned_error_free_mm"),
     )
 )

@@ -49,7 +49,7 @@ def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_nothing_that_rows_name_is_imported(hostile: Path) -> None:
-    assert cli.main(["report", ".", "--pictures", "9"]) == 0
+    assert cli.main(["report", ".", "--max-pictures", "9"]) == 0
     assert cli.main(["compare", ".", ".", "--out", "made"]) == 0
     assert "evil" not in sys.modules
     assert not (hostile / "touched").exists()

@@ -1,4 +1,4 @@
-"""Fit planes, cylinders and cones to flat pieces of a surface, and find the pieces on them and their ends."""
+"""Fit planes, cylinders and cones to facets, and find the facets on a fitted surface and its ends."""
 
 from typing import Any, NamedTuple
 
@@ -9,31 +9,31 @@ from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
 from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
-_MOST_POINTS = 400
+_MOST_POINTS = 400  # in a fit of a round surface
 _TURNED = 0.09
-"""How far a flat piece may be turned from its round face, beyond half of the angle that it spans, [rad]."""
+"""Tolerance between the normals of a facet and of its round face, beyond half the angle that the facet spans, [rad]."""
 _WIDEST = 1.6
-"""No strip of a round face is wider than most by this factor, unless all of it is near to the face."""
+"""The widest facet of a round face, over the median one; wider ones count only if they are near the face everywhere."""
 NEAR_MM = 0.02
-"""Sides stand for a round face if they, and their corners, are this near to it."""
+"""A facet is on a round face regardless of its width if its sagitta is below this."""
 ON_WALL = 1e-5
-"""Of the size of a part: corners of a round face are this near to it."""
-_SNAP_RAD = 2e-6
-_FULL_RAD = 1e-6
+"""Largest distance of corners from their round face, as a share of the size of a part."""
+_SNAP_RAD = 2e-6  # an axis or normal nearer to an axis of the frame is set to it
+_FULL_RAD = 1e-6  # a wall with no wider gap goes all the way round
 
 
 class Round(NamedTuple):
-    """A cylinder, or a cone, that has no ends."""
+    """An infinite cylinder or cone."""
 
-    point: Array
-    axis: Array
+    point: Array  # a point on the axis
+    axis: Array  # unit vector
     radius: float
-    """At the point."""
+    """The radius at the point."""
     slope: float
-    """By how much it grows along the axis."""
+    """Increase of the radius per length along the axis; 0 for a cylinder."""
 
     def polar(self, points: Array) -> tuple[Array, Array, Array]:
-        """Height, distance from the axis, and the way from it, (k, 3)."""
+        """Return height along the axis, distance from it, (k,) each, and the unit direction away from it, (k, 3)."""
         off = points - self.point
         height = off @ self.axis
         out = off - height[:, None] * self.axis
@@ -41,17 +41,17 @@ class Round(NamedTuple):
         return height, distance, out / np.maximum(distance, 1e-300)[:, None]
 
     def off(self, points: Array) -> Array:
-        """Return how far points are outside of it, square to its wall, (k,)."""
+        """Return the signed distance of points from the wall, positive outside, (k,)."""
         height, distance, _ = self.polar(points)
         return (distance - self.radius - self.slope * height) / np.hypot(1.0, self.slope)
 
     def normals(self, out: Array) -> Array:
-        """Return outward normals where the way from the axis is `out`, (k, 3)."""
+        """Return outward unit normals of the wall, (k, 3), where the direction away from the axis is `out`, (k, 3)."""
         return (out - self.slope * self.axis) / np.hypot(1.0, self.slope)
 
 
 def circle_through(points: Array, axis: Array) -> Round | None:
-    """Return the cylinder along an axis nearest to points."""
+    """Return the cylinder along a given axis through points, by least squares; None if the points fix no circle."""
     x, y = find_square_axes(axis)
     middle = points.mean(axis=0)
     u = (points - middle) @ x
@@ -70,16 +70,21 @@ def circle_through(points: Array, axis: Array) -> Round | None:
 
 
 def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None:
-    """Return the wall nearest to points by least squares: distances square to the wall, Levenberg-Marquardt.
+    """Return the cylinder or cone nearest to points: Levenberg-Marquardt on distances from the wall.
 
-    None: there is no start, there are too few points, or nothing fits.
+    Args:
+        start: Where the iteration begins.
+        cone: Whether the slope is free.
+
+    Returns:
+        None if there is no start, there are too few points, or the result is not finite.
     """
     if start is None:
         return None
-    points = points[:: -(-len(points) // _MOST_POINTS)]
+    points = points[:: -(-len(points) // _MOST_POINTS)]  # every n-th point, so that at most _MOST_POINTS are left
     middle = points.mean(axis=0)
     height, distance, _ = start.polar(points)
-    # The point of the axis next to the middle of the points, so that turns of the axis and the radius hardly interact.
+    # The point of the axis nearest to the mean of the points, so that tilts of the axis and the radius hardly interact.
     at = start.point + (middle - start.point) @ start.axis * start.axis
     size = max(float(np.ptp(points, axis=0).max()), 1e-300)
     x, y = find_square_axes(start.axis)
@@ -91,7 +96,10 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
         slope, radius = np.polyfit(height - (middle - start.point) @ start.axis, distance, 1)
 
     def moved(p: Array) -> Round:
-        """By p: two turns of the axis, two shifts across it, the radius (all in sizes), the slope of a cone."""
+        """Return the surface with parameters p: two tilts of the axis, two shifts across it, radius, slope of a cone.
+
+        Shifts and radius are shares of the size of the points.
+        """
         axis = start.axis + p[0] * x + p[1] * y
         axis = axis / np.linalg.norm(axis)
         return Round(at + size * (p[2] * x + p[3] * y), axis, size * p[4], p[5] if cone else 0.0)
@@ -108,15 +116,16 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
 
 
 def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
-    """Return which flat pieces lie on a round surface.
+    """Find the facets on a round surface.
 
     Args:
-        among: The pieces to measure, ascending.
+        among: Facets to test, ascending.
+        tolerance: Largest distance from the wall, beyond the sagitta, [mm].
 
     Returns:
-        Those that do; whether it is a hole; and the angle that each spans, [rad].
+        The facets on it, whether it is the wall of a hole, and the angle that each facet spans about the axis, [rad].
     """
-    # Corners of these pieces, piece by piece: `rows` of the table of corners, `starts` of each piece in them.
+    # Corners of these facets, facet by facet: `rows` of the table of corners, `starts` of each facet in `rows`.
     first = np.searchsorted(facets.owner, among, side="left")
     counts = np.searchsorted(facets.owner, among, side="right") - first
     starts = np.cumsum([0, *counts[:-1]])
@@ -139,7 +148,7 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
     good &= np.abs(facing) > np.cos(np.minimum(span / 2.0 + _TURNED, 1.0))
     if not good.any():
         return among[good], False, span[good]
-    # A hole if most of the area faces the axis; the other pieces are of another face.
+    # It is a hole if most of the area faces the axis; facets that face the other way belong to another face.
     hole = bool((np.sign(facing[good]) * facets.areas[among][good]).sum() < 0.0)
     good &= (facing < 0.0) == hole
     if good.any():
@@ -149,13 +158,17 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
 
 
 def axis_of(normals: Array, cone: bool) -> Array:
-    """Return the direction to which normals are square, or have one angle: that in which they differ least."""
+    """Return the axis of a round face from facet normals, (3,): the direction in which the normals differ least.
+
+    Normals of a cylinder are square to its axis, those of a cone at a constant angle, hence without their mean.
+    """
     rows = normals - normals.mean(axis=0) if cone else normals
+    # The right singular vector of the smallest singular value.
     return np.asarray(np.linalg.svd(rows, full_matrices=len(rows) < 3)[2][2])
 
 
 def fit_plane(mesh: Mesh, triangles: Any) -> Region:
-    """Return the plane nearest to triangles that lie in one."""
+    """Return the region of coplanar triangles, with the plane nearest to them."""
     n = mesh.across[triangles].sum(axis=0)
     n = _snap(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
@@ -164,28 +177,35 @@ def fit_plane(mesh: Mesh, triangles: Any) -> Region:
 
 
 def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
-    """Return triangles on the plane through a point."""
+    """Return the region of triangles on the plane through a point."""
     n = _snap(normal / np.linalg.norm(normal))
     return Region("plane", triangles, direction=n, point=float(point @ n) * n)
 
 
 def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
-    """Return triangles on a cylinder or a cone, with the ends of it."""
-    # An axis has no sense: its largest component is taken as positive, and its point is the foot of the
-    # origin, so that one file gives the same numbers each time.
+    """Return the region of triangles on a cylinder or a cone, with its two ends.
+
+    Args:
+        surface: The fitted surface.
+        hole: Whether the wall faces its axis.
+        turn: Angle that the wall covers about the axis, [rad].
+        sides: Facets around a full turn in the mesh; 0: unknown.
+    """
+    # The sign of an axis is arbitrary: its largest component is made positive, and its point is the foot of the origin,
+    # so that a file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
     slope = surface.slope * float(np.sign(axis @ surface.axis))
     axis = _snap(axis)
     point = surface.point - surface.point @ axis * axis
-    foot = float(surface.point @ axis)
+    foot = float(surface.point @ axis)  # height of the surface's own point over the new one
     every = np.unique(mesh.triangles[triangles])
     height, distance, _ = Region("cylinder", triangles, direction=axis, point=point).polar(mesh.corners[every])
     low = float(height.min())
     high = float(height.max())
     radii = [max(surface.radius + slope * (h - foot), 0.0) for h in (low, high)]
     if slope:
-        radii = [0.0 if r < ON_WALL * mesh.extent else r for r in radii]
-    # How far corners of the border are from the nearer end: of a square wall all of them are on one of the two.
+        radii = [0.0 if r < ON_WALL * mesh.extent else r for r in radii]  # snaps the tip of a cone to radius 0
+    # Distance of each border corner from the nearer end; if both ends are level circles, it is 0 for all of them.
     ends = np.minimum(height - low, high - height)[np.isin(every, border_of(mesh, triangles))]
     off = (distance - radii[0] - slope * (height - low)) / np.hypot(1.0, slope)
     on = off > -ON_WALL * mesh.extent
@@ -204,11 +224,11 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
 
 
 def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
-    """Return how far around its axis a wall reaches, as its triangles lie there, [rad]."""
+    """Return the angle about the axis that the triangles of a wall cover, [rad]."""
     x, y = find_square_axes(wall.axis)
     _, distance, out = wall.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
     angle = np.arctan2(out @ y, out @ x).reshape(-1, 3)
-    # Each triangle from its lowest to its highest angle, seen from one of its corners; one on the axis has no angle.
+    # Angular range of each triangle, relative to one of its corners off the axis, where the angle is defined.
     sound = (distance > 1e-6 * distance.max()).reshape(-1, 3)
     first = angle[np.arange(len(angle)), sound.argmax(axis=1)]
     off = np.where(sound, (angle - first[:, None] + np.pi) % WHOLE_TURN - np.pi, 0.0)
@@ -216,7 +236,7 @@ def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
     order = np.argsort(low)
     high = (low + off.max(axis=1) - off.min(axis=1))[order]
     low = low[order]
-    # Gaps between the farthest angle that was reached so far and the next lowest one, around the turn.
+    # Gaps between the largest angle covered so far and the next lower end, once around.
     reach = np.maximum.accumulate(high)
     gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
     widest = float(gaps.max())
@@ -224,14 +244,14 @@ def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
 
 
 def _snap(n: Array) -> Array:
-    """A direction along an axis of the frame, if it is so within rounding."""
+    """Return the direction, set to an axis of the frame if it differs only by rounding."""
     axis = int(np.abs(n).argmax())
     exact = np.sign(n[axis]) * np.eye(3)[axis]
     return exact if np.linalg.norm(n - exact) < _SNAP_RAD else n
 
 
 def border_of(mesh: Mesh, triangles: Any) -> Any:
-    """Return corners on the border of a region."""
+    """Return the corners on the border of a region, ascending."""
     inside = np.zeros(len(mesh.triangles), dtype=bool)
     inside[triangles] = True
-    return np.unique(mesh.edges[inside[mesh.neighbours].sum(axis=1) == 1])
+    return np.unique(mesh.edges[inside[mesh.neighbours].sum(axis=1) == 1])  # edges with one triangle inside

@@ -1,4 +1,4 @@
-"""Find cylinders and cones in a mesh: they grow from smooth parts of its surface, or from single edges in them."""
+"""Find cylinders and cones in a mesh by region growing: from whole smooth groups of facets, then from single edges."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -11,40 +11,40 @@ from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circl
 from apo_bench.importers.cad.solids import Mesh, find_connected_groups
 
 _FEWEST = 3
-"""Flat pieces of a round face."""
+"""Smallest number of facets of a round face."""
 _MOST_WORK = 3_000_000
-"""The number of flat pieces that are measured, over all trials, in one part."""
+"""Limit on the facets that are measured in one part, over all attempts."""
 _MOST_FAILED = 100
-"""The number of failed trials, one after the other, in one smooth part of a surface."""
+"""Failed attempts in a row after which the search in one smooth group ends."""
 _MOST_SEED = 100
-"""The number of flat pieces with which a trial begins."""
+"""Largest number of facets from which an attempt starts."""
 _SAME_BEND = 0.15
-"""Edges of one cone bend by the same angle within this share."""
+"""Edges of one cone have equal angles, within this share."""
 
 
 class FoundWall(NamedTuple):
-    """A round surface and the flat pieces on it."""
+    """A cylinder or cone and the facets on it."""
 
     surface: Round
-    members: Any
+    members: Any  # the facets, ascending
     hole: bool
-    spans: Array
+    spans: Array  # angle that each facet spans about the axis, (len(members),), [rad]
 
     @property
     def sides(self) -> int:
-        """Of a whole turn of it."""
+        """The number of facets around a full turn."""
         return round(WHOLE_TURN / float(np.median(self.spans)))
 
 
 def find_walls(mesh: Mesh, facets: Facets) -> list[FoundWall]:
-    """Find cylinders and cones in each smooth part of the surface: first in all of it, then from edges in it."""
+    """Return the cylinders and cones of each smooth group of facets, fitted to all of it or grown from edges."""
     walls: list[FoundWall] = []
     work = _MOST_WORK
     for group in smooth_groups(facets, np.unique(facets.smooth)):
         if len(group) < _FEWEST:
             continue
         inside = np.isin(facets.smooth[:, 0], group)
-        # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
+        # Most smooth groups are one wall, such as a hole: then a single fit to the whole group suffices.
         points = mesh.corners[np.unique(facets.along[inside])]
         axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
         starts = ((refine_round(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
@@ -59,12 +59,16 @@ def find_walls(mesh: Mesh, facets: Facets) -> list[FoundWall]:
 
 
 def _merge_walls(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
-    """Return the walls of a smooth part of the surface, the large ones with what small ones had taken of them.
+    """Resolve overlaps of the walls of one smooth group: larger walls first, each regrown over facets that others took.
 
-    A few sides lie on many walls, of which only one is true.
+    A few facets lie on many walls, of which only one is true.
+
+    Args:
+        group: The facets of the group, ascending.
+        inside: Which smooth edges belong to the group, (s,).
     """
     walls: list[FoundWall] = []
-    left = group
+    left = group  # facets of no wall yet
     for wall in sorted(found, key=lambda wall: -len(wall.members)) if len(found) > 1 else found:
         mine = np.isin(wall.members, left)
         rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
@@ -82,7 +86,16 @@ def _merge_walls(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: lis
 
 
 def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) -> tuple[list[FoundWall], int]:
-    """Return the walls in part of a smooth surface, from the longest edges first, and the work that is left."""
+    """Grow walls from the edges of a smooth group, longest edges first.
+
+    Args:
+        group: The facets of the group, ascending.
+        inside: Which smooth edges belong to the group, (s,).
+        work: Facets that may still be measured.
+
+    Returns:
+        The walls, and the work that is left.
+    """
     walls = list[FoundWall]()
     taken = np.zeros(len(facets.areas), dtype=bool)
     rows = np.flatnonzero(inside)
@@ -99,8 +112,8 @@ def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: 
         if work < 0 or failed > _MOST_FAILED:
             break
         failed += 1
-        # A cylinder is tried before a cone, which fits every cylinder too; a start that does not even hold the pieces
-        # that it was made of is not worth a fit.
+        # Try a cylinder first, as a cone fits every cylinder too. A start that does not even hold its own facets is not
+        # worth a fit.
         for cone in (False, True):
             start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, edges_around, taken)
             if start is None or len(facets_on(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
@@ -120,7 +133,15 @@ def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: 
 def _seed_cylinder(
     mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
-    """Return the cylinder along an edge, through its neighbours, and the flat pieces there."""
+    """Return a start for a cylinder from edge `row`, and the facets around that edge.
+
+    The axis is the edge, the circle goes through the ends of parallel edges nearby. None if there are too few.
+
+    Args:
+        row: Row of the smooth edge in `facets.smooth`.
+        edges_around: Facet -> rows of its smooth edges.
+        taken: Which facets belong to earlier walls, (f,).
+    """
     a, b = mesh.corners[facets.along[row]]
     length = np.linalg.norm(b - a)
     edges = (r for piece in facets.smooth[row].tolist() for r in edges_around[piece])
@@ -138,8 +159,12 @@ def _seed_cylinder(
 def _seed_cone(
     mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
-    """Return the cone of the pieces that meet at one angle, one after the other, and these pieces."""
-    # Strips of one tessellated cone meet at one angle; from the first piece outwards over edges with nearly this angle.
+    """Return a start for a cone from edge `row`, and the facets it was fitted to; None if there are too few.
+
+    Args:
+        row, edges_around, taken: As in `_seed_cylinder`.
+    """
+    # Facets of one cone meet at equal angles: collect them outwards from the first facet over edges of that angle.
     angle = facets.angle[row]
     members = {int(facets.smooth[row, 0])}
     rows = set()
@@ -166,14 +191,19 @@ def _grow(
     starts: Iterable[tuple[Round | None, bool]],
     seed: int | None = None,
 ) -> FoundWall | None:
-    """Return the flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them.
+    """Alternate between finding the facets on a surface and refitting the surface, until both are stable.
 
     Args:
+        among: Facets that may be used, ascending.
         inside: Which smooth edges may be used, (s,).
-        starts: Surfaces to begin with, and whether they are cones; the first one that holds is taken.
+        starts: Surfaces to start from, and whether each is a cone; the first that converges counts.
+        seed: The result holds the facets connected with this one; None: all facets on the surface.
+
+    Returns:
+        The wall; None if no start holds enough facets.
     """
     for surface, cone in starts:
-        # In turns: the pieces on the surface, loosely at first, and the surface nearest to them, until nothing changes.
+        # The first pass has three times the tolerance, as the start is only roughly right.
         count = 0
         loose = 3.0
         best = None
@@ -192,7 +222,7 @@ def _grow(
                 break
             count = len(members)
             loose = 1.0
-            # Only corners of edges within the surface: those on its border may belong to a chamfer or a fillet.
+            # Fit only to edges between two member facets: corners of the border may belong to a chamfer or a fillet.
             both = inside & np.isin(facets.smooth, members).all(axis=1)
             points = mesh.corners[np.unique(facets.along[both])]
             surface = refine_round(surface, points, cone) if len(points) >= 6 else None
@@ -202,7 +232,7 @@ def _grow(
 
 
 def _is_connected(smooth: Any, members: Any, seed: int) -> Any:
-    """Which members, ascending, are connected with a seed by pairs of flat pieces; none if it is not among them."""
+    """Return which members, ascending, are connected with a seed by smooth edges; none if the seed is no member."""
     if seed not in members:
         return np.zeros(len(members), dtype=bool)
     _, group = _smoothly_connected(smooth, members)
@@ -210,7 +240,7 @@ def _is_connected(smooth: Any, members: Any, seed: int) -> Any:
 
 
 def smooth_groups(facets: Facets, members: Any) -> list[Any]:
-    """Return groups of flat pieces that are smoothly connected, over those of the list alone."""
+    """Return the groups of `members`, ascending, that are connected by smooth edges between members."""
     if not len(members):
         return []
     count, group = _smoothly_connected(facets.smooth, members)
@@ -219,5 +249,5 @@ def smooth_groups(facets: Facets, members: Any) -> list[Any]:
 
 
 def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
-    """How many groups members, ascending, are by the pairs among them, and the group of each."""
+    """Return the number of groups that smooth edges between members make, and the group of each member."""
     return find_connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

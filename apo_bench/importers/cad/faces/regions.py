@@ -1,4 +1,4 @@
-"""Find the faces of a mesh: cylinders and cones that no free surface contains as bands, then planes."""
+"""Find the faces of a mesh: cylinders and cones, then planes; facets of free-form surfaces become unnamed regions."""
 
 from typing import Any, NamedTuple
 
@@ -11,24 +11,24 @@ from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_
 from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
 _LARGER = 8.0
-"""A flat piece that is larger by this factor than most of its neighbours on a free surface is a plane next to it."""
+"""A facet larger than the upper quartile of its smooth neighbours by this factor is a plane, not free-form."""
 _BAND = 3.0
-"""Bands of one free surface differ by less than this in how wide they are and how they bend."""
+"""Bands of one free-form surface differ by less than this factor in width and in the angle between them."""
 _GAP = 1.8
-"""A turn is whole if no gap in it is this much wider than a strip."""
+"""A wall goes all the way round if no gap is wider than this many facets."""
 
 
 class _End(NamedTuple):
-    """What a round surface goes over into smoothly at one of its ends."""
+    """The smooth transition at one end of a round surface to what lies beyond."""
 
     beyond: frozenset[int]
-    """Other round surfaces; -1 is anything else."""
-    angle: float
+    """Round surfaces beyond the end; -1 stands for anything else."""
+    angle: float  # median angle of the transition, [rad]
     width: float
-    """Of what is beyond it, across."""
+    """Median width of the facets beyond the end, [mm]."""
 
     def is_like(self, angle: float, width: float) -> bool:
-        """Whether what is beyond bends as much, the same way, and is as wide."""
+        """Whether the transition bends in the same direction with a similar angle, and the width is similar."""
         return (
             self.angle * angle > 0.0
             and max(abs(self.angle), abs(angle)) < _BAND * min(abs(self.angle), abs(angle))
@@ -37,10 +37,10 @@ class _End(NamedTuple):
 
 
 def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
-    """Return the faces of a closed mesh, in an order that its triangles give.
+    """Return the faces of a closed mesh, ordered by their first triangle.
 
     Args:
-        fewest: Sides of a whole turn of a round face; a wall with fewer sides is flat faces.
+        fewest: Smallest number of facets of a round face around a full turn; walls with fewer become flat faces.
     """
     facets = find_facets(mesh, fewest)
     every = _drop_bands(mesh, facets, find_walls(mesh, facets))
@@ -50,8 +50,8 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
         round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall), wall.sides)
         for wall, mine in zip(walls, triangles, strict=True)
     ]
-    left = _wall_of_pieces(facets, walls) < 0
-    thin = facets.areas < (FLAT * mesh.extent) ** 2
+    left = _wall_of_pieces(facets, walls) < 0  # facets on no wall
+    thin = facets.areas < (FLAT * mesh.extent) ** 2  # slivers
     free = _find_free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
     regions += [fit_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
     groups = smooth_groups(facets, np.flatnonzero(free))
@@ -60,7 +60,7 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
 
 
 def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
-    """Which round surface each flat piece belongs to, (f,); -1: none."""
+    """Return the index of the wall of each facet, (f,); -1 for none."""
     of = np.full(len(facets.areas), -1)
     for k, wall in enumerate(walls):
         of[wall.members] = k
@@ -68,11 +68,15 @@ def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
 
 
 def _find_free(facets: Facets, left: Any) -> Any:
-    """Which flat pieces belong to surfaces that are neither flat nor round."""
+    """Return which facets belong to free-form surfaces, (f,): those with smooth edges that are not far larger.
+
+    Args:
+        left: Which facets are on no wall, (f,).
+    """
     pairs = facets.smooth[left[facets.smooth].all(axis=1) & (np.abs(facets.angle) < SMOOTH_RAD)]
     free = np.zeros(len(left), dtype=bool)
     free[pairs] = True
-    # Of each piece the areas of its neighbours, ascending: a piece far larger than their upper quartile is a plane.
+    # Areas of the neighbours of each facet, ascending; the index below picks their upper quartile.
     owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((facets.areas[other], owner))
     pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)
@@ -81,9 +85,9 @@ def _find_free(facets: Facets, left: Any) -> Any:
 
 
 def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
-    """Remove walls that are only strips of a torus, a sphere or a free surface.
+    """Remove walls that are only bands of a torus, a sphere or another free-form surface.
 
-    The mesh approximates such a surface by strips (bands), each of which continues smoothly in the next at both ends.
+    The mesh approximates such a surface by bands, each of which continues smoothly in the next at both ends.
     """
     of = _wall_of_pieces(facets, walls)
     bands: set[int] = set()
@@ -94,15 +98,15 @@ def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[Foun
         height, distance, _ = wall.surface.polar(corners)
         width = float(np.ptp(height)) * float(np.hypot(1.0, wall.surface.slope))
         mine = _ends(mesh, facets, of, k, wall, float(height.min() + height.max()) / 2.0)
-        # A fillet of a curved edge is shorter than its arc is long, and smooth at an end; a band between two others
-        # bends there as they do.
+        # A fillet of a curved edge is narrower than its arc is long, and smooth at one end at least. A band between two
+        # others bends by the same angle at both ends.
         turn = _turn(facets, wall)
         is_short = turn < WHOLE_TURN and bool(mine) and width < turn * float(distance.mean())
         if is_short or (len(mine) == 2 and all(end.is_like(mine[0].angle, width) for end in mine)):
             bands.add(k)
         widths.append(width)
         ends.append(mine)
-    # What goes over into a band and is like it is one, too, until nothing more is.
+    # What continues into a band with similar angle and width is a band too; repeat until nothing changes.
     before = -1
     while len(bands) > before:
         before = len(bands)
@@ -113,13 +117,14 @@ def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[Foun
 
 
 def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: float) -> list[_End]:
-    """The ends of round surface k that are smooth.
+    """Return the ends of round surface k that continue smoothly, at most two.
 
     Args:
-        of: Round surface of each flat piece.
-        middle: Height of the middle of the surface.
+        wall: Round surface number k.
+        of: Round surface of each facet, (f,); -1 for none.
+        middle: Height of the middle of the surface along its axis, which separates the two ends.
     """
-    # Edges that only one side of is on the surface, and that go around its axis rather than along it.
+    # Edges with one facet on the surface that run around the axis, not along it.
     mine = of[facets.smooth] == k
     rows = np.flatnonzero(mine.sum(axis=1) == 1)
     points = mesh.corners[facets.along[rows]]
@@ -128,6 +133,7 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: 
     rows = rows[across]
     at = points[across].mean(axis=1)
     beyond = np.where(mine[rows, 0], facets.smooth[rows, 1], facets.smooth[rows, 0])
+    # A facet is twice as wide as its centre is far from the edge.
     width = 2.0 * np.linalg.norm(facets.centers[beyond] - at, axis=1)
     low = wall.surface.polar(at)[0] < middle
     return [
@@ -138,7 +144,7 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: 
 
 
 def _turn(facets: Facets, wall: FoundWall) -> float:
-    """How far around its axis a round face reaches."""
+    """Return the angle that the facets of a round face cover about its axis, [rad]."""
     x, y = find_square_axes(wall.surface.axis)
     _, _, out = wall.surface.polar(facets.centers[wall.members])
     middle = np.sort(np.arctan2(out @ y, out @ x))

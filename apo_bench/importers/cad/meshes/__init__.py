@@ -1,1 +1,1 @@
-"""Files of triangles become closed meshes of solids, [mm]."""
+"""Read files of triangles as closed meshes of solids, [mm]."""

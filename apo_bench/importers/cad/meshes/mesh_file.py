@@ -1,4 +1,4 @@
-"""Read a file of triangles, STL, OBJ or 3MF, into meshes in mm, by the unit that is stated or fits."""
+"""Read a file of triangles, STL, OBJ or 3MF, as meshes in mm, in the unit that is stated or fits the size."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,31 +13,30 @@ from apo_bench.importers.cad.solids import Mesh
 from apo_bench.io import read_bytes
 
 _SUFFIXES = (".stl", ".obj", ".3mf")
-_UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-_LARGEST_BYTES = 60_000_000
-MOST_CAD_TRIANGLES = 400_000
-SMALLEST_PART_MM = 1.0
-LARGEST_PART_MM = 2000.0
-"""Limits of the longest side of a part."""
+_UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # unit -> mm
+_LARGEST_BYTES = 60_000_000  # of a file
+MOST_CAD_TRIANGLES = 400_000  # in a file
+SMALLEST_PART_MM = 1.0  # shortest allowed longest side of a part
+LARGEST_PART_MM = 2000.0  # longest allowed longest side of a part
 _OPEN_BELOW_MM = 10.0
-"""Where a file states no unit, it is mm from this size on."""
+"""Without a stated unit, a longest side of at least this is taken to be in mm."""
 _UNUSUAL_BELOW_MM = 30.0
-"""Below this size mm are assumed with a warning."""
+"""Below this longest side the assumption of mm comes with a warning."""
 
 
 class CadFile(NamedTuple):
-    """What is known of a file."""
+    """The unit and the warnings of a CAD file that was read."""
 
     unit: str
     unit_from: str
-    """How the unit is known."""
+    """How the unit is known, as a phrase."""
     left_out: tuple[str, ...] = ()
-    """Why some of its solids are not read."""
+    """Why some of the solids of the file are not read, one sentence each."""
     warnings: tuple[str, ...] = ()
 
 
 def read_cad_bytes(path: Path, kind: str) -> bytes:
-    """Read a CAD file.
+    """Read the bytes of a CAD file.
 
     Raises:
         InputError: There is no such file, it is too large, or empty.
@@ -48,10 +47,13 @@ def read_cad_bytes(path: Path, kind: str) -> bytes:
 
 
 def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tuple[str, Mesh]]]:
-    """Read a file of triangles: its objects by name, [mm].
+    """Read a file of triangles.
 
     Args:
-        unit: Of the numbers in it; None: the stated one, else mm if no other unit fits the size.
+        unit: Unit of its numbers; None: the stated one, else mm if the size leaves no doubt.
+
+    Returns:
+        The unit with warnings, and the objects as pairs of name and mesh, [mm].
 
     Raises:
         InputError: No such file, another kind of file, no triangles, or a size that leaves the unit open.
@@ -78,7 +80,13 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
 
 
 def _choose_unit(path: Path, unit: str | None, stated: str | None, size: float) -> CadFile:
-    """Return the unit of the numbers of a file, with a warning where mm are only one of several that fit."""
+    """Choose the unit of a file; warn if mm is only one of several units that fit.
+
+    Args:
+        unit: The unit that the user gave.
+        stated: The unit that the file states.
+        size: Longest side in the numbers of the file.
+    """
     used = unit or stated or "mm"
     source = "as asked" if unit else "stated in the file" if stated else "taken from the size; the file states none"
     longest = size * _UNITS_MM[used]
@@ -98,14 +106,18 @@ def _choose_unit(path: Path, unit: str | None, stated: str | None, size: float) 
 
 
 def check_triangles(path: Path, count: int) -> None:
-    """Refuse a file without triangles, or with too many."""
+    """Raise InputError for a file without triangles, or with too many."""
     require(count, f"{path}: the file holds no triangles; save the part as a mesh.")
     most = f"{MOST_CAD_TRIANGLES:,} are the most"
     require(count <= MOST_CAD_TRIANGLES, f"{path}: the file has {count:,} triangles; {most}.")
 
 
 def check_size(path: Path, longest_mm: float, unit: str) -> None:
-    """Refuse a file whose longest side is not that of a part."""
+    """Raise InputError if the longest side is not that of a part.
+
+    Args:
+        unit: The unit and its origin, for the message.
+    """
     allowed = f"{SMALLEST_PART_MM:g} mm to {LARGEST_PART_MM / 1000:g} m"
     require(
         SMALLEST_PART_MM <= longest_mm <= LARGEST_PART_MM,

@@ -1,6 +1,6 @@
-"""Read OBJ: triangles cover each polygon once, also where it is concave.
+"""Read OBJ files; polygons, concave ones too, are triangulated so that triangles cover each polygon once.
 
-trimesh 5.2 cuts every polygon into a fan from its first corner: a concave one becomes another surface.
+trimesh 5.2 cuts every polygon into a fan from its first corner, which changes the surface of a concave one.
 """
 
 from pathlib import Path
@@ -14,11 +14,11 @@ from apo_bench.geometry import Array
 from apo_bench.importers.cad.solids import Mesh, find_square_axes
 
 _SAME_AREA = 1e-6
-"""Triangles cover a polygon once if their areas add up to its area within this part."""
+"""Triangles cover a polygon once if the sum of their areas equals its area within this share."""
 
 
 def read_obj(path: Path, raw: bytes) -> Mesh:
-    """Read the mesh of all faces of a file.
+    """Read all faces of a file as one mesh.
 
     Raises:
         InputError: It is no OBJ file, or a polygon crosses itself.
@@ -46,7 +46,15 @@ def read_obj(path: Path, raw: bytes) -> Mesh:
 
 
 def _triangulate(points: Array, polygon: Any) -> Any:
-    """Triangles, (n - 2, 3), of a polygon with these points, (n, 3); None if they cannot cover it once."""
+    """Triangulate a polygon.
+
+    Args:
+        points: (n, 3), its corners.
+        polygon: (n,), their numbers in the file.
+
+    Returns:
+        Triangles of those numbers, (n - 2, 3), none for a polygon without area; None if it crosses itself.
+    """
     if len(polygon) == 3:
         return polygon[None]
     points = points - points[0]

@@ -1,4 +1,4 @@
-"""Closed meshes become solids: shells are separated, turned outwards, united where they cross, and cavities found."""
+"""Turn closed meshes into solids: separate shells, orient them outwards, unite crossing ones, and assign cavities."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -20,18 +20,18 @@ from apo_bench.importers.cad.solids import (
     simplify_body,
 )
 
-_MOST_SHELLS = 200
+_MOST_SHELLS = 200  # in one file
 _THINNEST = 1e-6
-"""Volume over twice the area, in parts of the size: a thinner shell is a sheet."""
+"""A shell whose volume over twice its area is below this share of its size is a sheet, not a solid."""
 _OPPOSED = 1e-9
-"""Normals of neighbours are opposite to each other within this much of a cosine."""
+"""Neighbours lie on each other if the cosine of their normals is within this of -1."""
 _NARROWEST = 1e-3
-"""Triangles of less height, in parts of the size of the solid, are noise."""
+"""Triangles with a smaller height, as a share of the size of the solid, are noise."""
 _COMMON = 1e-6
-"""Solids that have less than this part of the smaller one in common only touch."""
+"""Solids with a smaller common volume, as a share of the smaller one, only touch."""
 _FEWER = 0.9
-"""Corners in flat pieces are left out if no more than this share of the triangles is left then."""
-INSIDE_OUT = "it was inside out, and was turned"
+"""Simplify a mesh only if this share of its triangles or less remains."""
+INSIDE_OUT = "it was inside out, and was turned"  # text of a repair
 
 
 def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
@@ -44,6 +44,7 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     found = [shell for run in _closed_runs(joined) for shell in _shells(path, run)]
     require(found, f"{path}: the triangles make no solid; save the part as a closed mesh.")
     require(len(found) <= _MOST_SHELLS, f"{path}: the file holds {len(found)} shells; {_MOST_SHELLS} are the most.")
+    # A negative volume: normals point inwards.
     repairs = (INSIDE_OUT,) if sum(shell.volume for shell in found) < 0.0 else ()
     solids, count = _combine([shell if shell.volume > 0.0 else shell.flip() for shell in found])
     if count < len(found):
@@ -57,9 +58,9 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
 
 
 def _closed_runs(mesh: Mesh) -> Iterator[Mesh]:
-    """Parts of a mesh that are closed as they follow each other in the file: so solids that touch stay two."""
+    """Yield consecutive runs of triangles that are closed surfaces, so that solids that touch stay apart."""
     begin = 0
-    open_sides = set[tuple[int, int]]()
+    open_sides = set[tuple[int, int]]()  # directed edges that still miss their opposite
     for k, (a, b, c) in enumerate(mesh.triangles.tolist(), start=1):
         for start, end in ((a, b), (b, c), (c, a)):
             if (end, start) in open_sides:
@@ -72,7 +73,7 @@ def _closed_runs(mesh: Mesh) -> Iterator[Mesh]:
 
 
 def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
-    """The connected surfaces of a mesh, but for sheets that have no room inside."""
+    """Return the connected surfaces of a mesh, without sheets that enclose no volume."""
     body = convert_to_manifold(mesh)
     if body.status() != manifold3d.Error.NoError:
         check_closed(path, mesh)
@@ -87,7 +88,7 @@ def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
 
 
 def check_closed(path: Path, mesh: Mesh) -> None:
-    """Refuse a mesh unless every edge has two triangles that face the same way."""
+    """Raise InputError unless every edge has two triangles with consistent orientation."""
     counts = np.unique(np.sort(mesh.sides, axis=1), axis=0, return_counts=True)[1]
     single, many = (counts == 1).sum(), (counts > 2).sum()
     require(not single, f"{path}: the shell is open: {single:,} edges have a triangle on one side only; close it.")
@@ -97,16 +98,19 @@ def check_closed(path: Path, mesh: Mesh) -> None:
 
 
 def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
-    """Return the solids that shells bound, and how many shells are left once those that cross are united.
+    """Combine shells into solids: shells that cross are united, shells inside others are cavities.
 
-    A shell in an even number of others is an outside, in an odd number a cavity.
+    A shell inside an even number of others is an outer surface, inside an odd number a cavity.
+
+    Returns:
+        The solids with their cavities, and the number of shells after uniting.
     """
     bodies = [convert_to_manifold(shell) for shell in shells]
     sizes = np.array([body.volume() for body in bodies])
     common = np.zeros((len(bodies), len(bodies)))
     for i, k in combinations(range(len(bodies)), 2):
         common[i, k] = common[k, i] = (bodies[i] ^ bodies[k]).volume()
-    is_within = (common > (1.0 - _COMMON) * sizes[:, None]) & (sizes[:, None] < sizes)
+    is_within = (common > (1.0 - _COMMON) * sizes[:, None]) & (sizes[:, None] < sizes)  # shell i lies within shell k
     is_crossing = (common > _COMMON * np.minimum.outer(sizes, sizes)) & ~is_within & ~is_within.T
     if is_crossing.any():
         _, group = find_connected_groups(np.argwhere(is_crossing), len(shells))
@@ -115,17 +119,18 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
             members = np.flatnonzero(group == g).tolist()
             body = manifold3d.Manifold.batch_boolean([bodies[k] for k in members], manifold3d.OpType.Add)
             united.append(shells[members[0]] if len(members) == 1 else convert_to_mesh(body))
-        return _combine(united)
+        return _combine(united)  # united shells may be within others, so start over
     depth = is_within.sum(axis=1)
     solids = []
-    for k in np.flatnonzero(depth % 2 == 0).tolist():
+    for k in np.flatnonzero(depth % 2 == 0).tolist():  # outer surfaces
+        # Cavities directly inside shell k.
         cavities = np.flatnonzero(is_within[:, k] & (depth == depth[k] + 1)).tolist()
         solids.append(concatenate_meshes([shells[k], *(shells[m].flip() for m in cavities)]))
     return solids, len(shells)
 
 
 def _check_unfolded(path: Path, mesh: Mesh) -> None:
-    """Refuse a solid with two neighbours that lie on each other, as in a concave face that was cut into a fan."""
+    """Raise InputError for two neighbouring triangles that lie on each other, as from a bad triangulation."""
     i, k = mesh.neighbours.T
     size = np.linalg.norm(mesh.across, axis=1)
     length = np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1)

@@ -1,6 +1,6 @@
-"""Read 3MF: the build of the root model places objects, which become meshes where they are.
+"""Read 3MF files: the build of the root model places objects, which become meshes at their places.
 
-trimesh 5.2 merges objects of two models that have one number, and takes supports for parts.
+trimesh 5.2 merges objects of different models with the same number, and reads supports as parts.
 """
 
 import re
@@ -18,33 +18,34 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.solids import Mesh
 
+# Unit of 3MF -> unit of `--unit`.
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
-_LARGEST_BYTES = 60_000_000
-_MOST_PLACES = 2000
+_LARGEST_BYTES = 60_000_000  # of all models and relations, unpacked
+_MOST_PLACES = 2000  # of objects that a file may place
 _PART_TYPES = ("", "model")
-"""Types of objects that are parts; `support`, `solidsupport`, `surface` and `other` are none."""
+"""Object types that are parts; `support`, `solidsupport`, `surface` and `other` are not."""
 _KNOWN_EXTENSIONS = {"p", "m", "t"}
-"""Prefixes of extensions that change no shape or are read here: production, materials, triangle sets."""
-_ROOT = re.compile(rb'Target="/?([^"]+\.model)"')
+"""Prefixes of extensions that do not change the shape or are read here: production, materials, triangle sets."""
+_ROOT = re.compile(rb'Target="/?([^"]+\.model)"')  # path of the root model in `_rels/.rels`
 _Key = tuple[str, str]
-"""The model of an object and its number."""
+"""Path of the model that holds an object, and the number of the object in it."""
 
 
 class _Object(NamedTuple):
-    """A mesh, or other objects at places."""
+    """An object of a 3MF file: a mesh, or other objects at places."""
 
     name: str
     is_part: bool
     mesh: Mesh
     components: list[tuple[_Key, Array]]
-    """Objects and their places, (4, 4), in units of the file."""
+    """Keys of the objects inside and their poses, (4, 4), in units of the file."""
 
 
 def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]], int]:
     """Read the objects that a file places.
 
     Returns:
-        The unit; name and mesh of each placed part; how many meshes are supports or others that are no parts.
+        The unit; name and mesh of each placed part; the number of meshes that are supports or other non-parts.
 
     Raises:
         InputError: It is no such file, too large, or needs an extension that is not read.
@@ -52,6 +53,7 @@ def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]], int]:
     try:
         with ZipFile(BytesIO(raw)) as archive:
             unit, objects, items = _read_models(path, archive)
+        # The build is treated as one outer object that holds all items.
         build = _Object("", True, Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), items)
         placed = _place(path, objects, build, np.eye(4), ())
         every = [*islice(placed, _MOST_PLACES + 1)]
@@ -67,7 +69,7 @@ def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]], int]:
 
 
 def _read_models(path: Path, archive: ZipFile) -> tuple[str, dict[_Key, _Object], list[tuple[_Key, Array]]]:
-    """Return the unit, the objects of all models, and the items of the build of the root model."""
+    """Return the unit, the objects of all models by key, and the items of the build of the root model."""
     files = {_file_name(each.filename): each for each in archive.infolist()}
     size = sum(each.file_size for name, each in files.items() if name.endswith((".model", ".rels")))
     require(size <= _LARGEST_BYTES, f"{path}: the 3MF file is larger than {_LARGEST_BYTES / 1e6:g} MB when unpacked.")
@@ -89,10 +91,16 @@ def _read_models(path: Path, archive: ZipFile) -> tuple[str, dict[_Key, _Object]
 
 
 def _file_name(target: str) -> str:
+    """Normalize a path inside the archive for comparison."""
     return target.strip("/").lower()
 
 
 def _read_object(model: str, element: ElementTree.Element) -> _Object:
+    """Read a mesh with its components.
+
+    Args:
+        model: Path of the model that holds the object.
+    """
     corners = _numbers(element.iterfind("{*}mesh/{*}vertices/{*}vertex"), ("x", "y", "z")).astype(np.float64)
     triangles = _numbers(element.iterfind("{*}mesh/{*}triangles/{*}triangle"), ("v1", "v2", "v3")).astype(np.int64)
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(corners):
@@ -103,19 +111,24 @@ def _read_object(model: str, element: ElementTree.Element) -> _Object:
 
 
 def _numbers(elements: Iterable[ElementTree.Element], names: tuple[str, str, str]) -> Any:
-    """Three attributes of each element, (n, 3)."""
+    """Return three attributes of each element as text, (n, 3)."""
     rows = [[each.attrib[name] for name in names] for each in elements]
     return np.array(rows, dtype=np.str_).reshape(-1, 3)
 
 
 def _read_places(model: str, elements: Iterable[ElementTree.Element]) -> list[tuple[_Key, Array]]:
-    """Components of an object, or items of a build."""
+    """Return the keys and poses, (4, 4), of the components of an object, or of the items of a build.
+
+    Args:
+        model: Path of the model that holds the elements.
+    """
     places = []
     for each in elements:
-        # The places of 3MF are rows: x' = x M.
+        # 3MF states transforms for row vectors, x' = x M, hence the transpose.
         T = np.eye(4)
         if words := each.get("transform", "").split():
             T[:3] = np.array(words, dtype=np.float64).reshape(4, 3).T
+        # A path in another model, or the same model.
         named = next((value for key, value in each.items() if key.endswith("}path")), model)
         places.append(((_file_name(named), each.get("objectid", "")), T))
     return places
@@ -124,10 +137,11 @@ def _read_places(model: str, elements: Iterable[ElementTree.Element]) -> list[tu
 def _place(
     path: Path, objects: dict[_Key, _Object], outer: _Object, T: Array, around: tuple[_Key, ...]
 ) -> Iterator[_Object]:
-    """Return the objects inside of another one at its place, (4, 4), without their components.
+    """Yield the objects inside another one, at all depths, with meshes moved to their places.
 
     Args:
-        around: The objects that the outer one is in, and itself.
+        T: (4, 4), pose of the outer object.
+        around: Keys of the outer object and those around it, to detect cycles.
     """
     for key, T_inner in outer.components:
         require(key in objects, f"{path}: object '{key[1]}' is not in the 3MF file; save the part again.")

@@ -1,1 +1,1 @@
-"""Solids are cut into convex pieces, [mm]."""
+"""Cut solids into convex pieces, [mm]."""

@@ -1,4 +1,4 @@
-"""Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
+"""Find the corners of convex pieces, without duplicates and within the limits on corners and sides, [mm]."""
 
 from itertools import product
 from typing import Any
@@ -9,44 +9,44 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from apo_bench.geometry import Array, Hull
 from apo_bench.importers.cad.solids import SAME_CORNER_MM, find_square_axes
 
-_MOST_CORNERS = 600
-_MOST_SIDES = 300
-_MOST_DIRECTIONS = 190
-"""Of a piece; of one that has more, the farthest corners are kept."""
+_MOST_CORNERS = 600  # corners of a piece
+_MOST_SIDES = 300  # planes of its sides
+_MOST_DIRECTIONS = 190  # edges
+"""Limits of a piece; of a piece beyond them only the outermost corners are kept."""
 _INSIDE_M = 5e-8
-"""A point deeper inside of a piece is no corner of it."""
+"""A point deeper inside a piece is no corner."""
 _THIN_MM = 0.02
-"""Pieces thinner than this across are left out."""
-_ON_MM = 2e-4
+"""Thinner pieces are left out."""
+_ON_MM = 2e-4  # corners this near to a plane lie in it
 _DIGITS = 9
-"""As they are written."""
+"""Decimals of corners in mm, as in part files."""
 _NO_PLANES = np.zeros((0, 4))
-_MOST_TRIED = 500
+_MOST_TRIED = 500  # sides of a hull whose thickness is measured
 _IN_PLANE = (16, 8, 4)
-"""In how many directions corners of a flat face are kept first."""
+"""Numbers of directions in a flat face whose outermost corners are kept first; the largest that fits is used."""
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-"""Directions in space in which corners are kept first."""
-_AT_A_TIME = 3
+"""Directions in space whose outermost corners are kept first: the 26 neighbours of a cube."""
+_AT_A_TIME = 3  # corners added to a reduced piece in each step
 _LEFT_MM = 0.02
-"""How far off a piece with fewer corners the surface may lie where others come by."""
+"""A reduced piece is good enough if no corner sticks out farther."""
 
 
 def corners_of(body: Any) -> Array:
-    """Return the corners of a body of manifold3d, (k, 3)."""
+    """Return the corners of a manifold3d body, (k, 3)."""
     raw = body.to_mesh64()
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
 def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
-    """Return the corners of the hull of points, each once; of too many the farthest, in flat faces and in space.
+    """Return the corners of the convex hull of points, (k, 3); if there are too many, the outermost ones.
 
     Args:
-        flats: Planes of flat faces, (k, 4).
-        cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
+        flats: Planes n . x = d of flat faces, (k, 4).
+        cuts: Planes along which the piece was cut, (k, 4); a reduced piece keeps touching its neighbours if possible.
     """
     points = np.round(merge_near_points(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
-    # Sides of a hull that differ by rounding are one; a corner between two such sides is then inside of the piece.
+    # Sides of a hull may differ by rounding only; a corner between two such sides then lies inside the merged plane.
     for _ in range(4):
         hull = Hull("", 1e-3 * corners)
         inside = (hull.planes[:, 3] - hull.corners @ hull.planes[:, :3].T).min(axis=1) > _INSIDE_M
@@ -57,7 +57,7 @@ def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array
 
 
 def _reduce(corners: Array, planes: Array) -> Array:
-    """The corners of a piece that has too many, of which the others leave out the least of it.
+    """Reduce the corners of a piece to the limits: keep the outermost, then add those that stick out most.
 
     Args:
         planes: Of flat faces and cuts, (k, 4), whose outlines are kept first.
@@ -78,12 +78,13 @@ def _reduce(corners: Array, planes: Array) -> Array:
 
 
 def _is_simple(corners: Array) -> bool:
+    """Whether a piece is within the limits on corners, sides and edges."""
     hull = Hull("", 1e-3 * corners)
     return len(corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
 
 
 def _on_flats(corners: Array, flats: Array, many: int) -> Any:
-    """The farthest corners in flat faces, in some directions each."""
+    """Return the indices of the outermost corners in each flat face, in `many` directions each."""
     kept = [np.zeros(0, dtype=np.intp)]
     turn = 2.0 * np.pi * np.arange(many) / many
     for n, d in zip(flats[:, :3], flats[:, 3], strict=True):
@@ -96,17 +97,17 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
 
 
 def merge_near_points(points: Array) -> Array:
-    """Return points without those that are near to an earlier one."""
+    """Return points without those near an earlier one."""
     return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
 
 
 def is_thick(points: Array) -> bool:
-    """Whether points span more than a sheet."""
+    """Whether the hull of points is thicker than a sheet."""
     try:
         planes = ConvexHull(points).equations
     except QhullError:
         return False
-    # The width of a hull is least across one of its sides, or between two edges, which is not looked at.
+    # The width of a hull is least across a side, or between two edges, which is not tested. Only some sides are tested.
     planes = planes[:: -(-len(planes) // _MOST_TRIED)]
     depth = -(points @ planes[:, :3].T + planes[:, 3]).min(axis=0)
     return bool(depth.min() > _THIN_MM)

@@ -1,4 +1,4 @@
-"""A part of a solid that is to be one piece, [mm]."""
+"""A body with the planes along which it was cut from a solid, and the operations that cut it further, [mm]."""
 
 from typing import Any, NamedTuple
 
@@ -7,21 +7,21 @@ import numpy as np
 from apo_bench.geometry import Array
 
 SLIVER = 1e-7
-"""A smaller share of a solid is rounding."""
+"""A smaller share of the volume of a solid is rounding."""
 
 
 class CutPart(NamedTuple):
-    """A part of a solid that is to be one piece."""
+    """A body that shall become one convex piece, with the planes of its cuts."""
 
     body: Any
-    """Of manifold3d."""
+    """A manifold3d body."""
     planes: Array
-    """Along which it was cut, (k, 4)."""
+    """Planes n . x = d along which it was cut, (k, 4)."""
 
     def halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
-        """Return the halves above and below the plane n . x = d, both a hair's breadth off it.
+        """Return the parts above and below the plane n . x = d, each trimmed by `hair` on its side of the plane.
 
-        On the plane, rounding would leave flaps of no thickness.
+        Trimming exactly on the plane would leave sheets of no thickness, by rounding.
         """
         planes = np.concatenate([self.planes, [[*n, d]]])
         above = CutPart(self.body.trim_by_plane(n, d + hair), planes)
@@ -29,17 +29,17 @@ class CutPart(NamedTuple):
 
 
 def bodies_of(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
-    """Return the connected bodies of halves, without those of less volume, [mm^3]."""
+    """Return the connected bodies of both halves, without those below a volume, [mm^3]."""
     every = (CutPart(body, half.planes) for half in halves for body in half.body.decompose())
     return [each for each in every if each.body.volume() > least]
 
 
 def cut_through(part: CutPart, point: Array, normals: Array, least: float, hair: float) -> list[CutPart]:
-    """Cut a part through a point along the plane that leaves the least hulls; return the part alone if none does.
+    """Cut a part along the plane through a point that leaves the least hull volume; return the part alone if none can.
 
     Args:
-        normals: Of the planes to try, (k, 3).
-        least: Bodies of less volume are rounding, and a half of less is none, [mm^3].
+        normals: Normals of the planes to try, (k, 3).
+        least: Smaller bodies are rounding, and a cut that leaves a smaller half does not count, [mm^3].
     """
     best = [part]
     smallest = np.inf

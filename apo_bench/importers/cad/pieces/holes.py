@@ -1,4 +1,4 @@
-"""Cut round holes out of convex pieces, as wedges that touch the wall from outside, [mm]."""
+"""Cut round holes out of convex pieces, as wedges that touch the wall of the hole from outside, [mm]."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -14,21 +14,23 @@ from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 
 
 def least_pieces(bores: Sequence[Region]) -> int:
-    """Return the smallest number of wedges around round holes."""
+    """Return the smallest number of wedges that surround round holes."""
     return sum(count_sides(1e-3 * max(bore.radii)) for bore in bores)
 
 
 def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
-    """Cut holes out of a convex piece, until there are too many pieces; return the convex pieces.
+    """Cut holes out of a convex piece, and return the corners of the convex pieces that remain, (k, 3) each.
 
     Args:
-        most: The largest number of pieces.
+        corners: (k, 3), of the piece.
+        flats: Planes of flat faces, (k, 4).
+        most: Cutting stops once there are more pieces than this.
     """
     parts = [manifold3d.Manifold.hull_points(corners)]
     bores = [bore for bore in bores if _meets(parts[0], bore)]
     if not bores:
         return [corners]
-    # First halfway between holes side by side, so that wedges around one do not run through the other one.
+    # First cut halfway between parallel holes, so that wedges around one hole do not run into another.
     for a, b in combinations(bores, 2):
         plane = _between(a, b)
         if plane is not None:
@@ -46,7 +48,7 @@ def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int)
 
 
 def _between(a: Region, b: Region) -> tuple[Array, float] | None:
-    """The plane n . x = d between two holes side by side."""
+    """Return the plane n . x = d halfway between the walls of parallel holes; None for other or overlapping holes."""
     if np.linalg.norm(np.cross(a.direction, b.direction)) > 1e-6:
         return None
     off = b.point - a.point
@@ -58,7 +60,7 @@ def _between(a: Region, b: Region) -> tuple[Array, float] | None:
 
 
 def _meets(part: Any, bore: Region) -> bool:
-    """Whether a part, seen along the axis of a hole, comes near to the hole."""
+    """Whether a convex part overlaps a hole: in its range of heights, and seen along its axis."""
     if part.is_empty():
         return False
     low, high = np.array(part.bounding_box()).reshape(2, 3)
@@ -68,13 +70,13 @@ def _meets(part: Any, bore: Region) -> bool:
     height, _, _ = bore.polar(corners)
     if height.max() < bore.span[0] + SAME_CORNER_MM or height.min() > bore.span[1] - SAME_CORNER_MM:
         return False
-    # Seen along the axis a convex part is the hull of its corners, and the axis is the origin.
+    # Projected along the axis, a convex part is the hull of its corners, and the axis is the origin.
     flat = (corners - bore.point) @ np.column_stack(bore.across)
     return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_CORNER_MM)
 
 
 def _around(part: Any, bore: Region) -> Iterator[Any]:
-    """A convex part less a round hole: what is below and above it, and wedges that touch its wall from outside."""
+    """Yield what remains of a convex part around a hole: parts above and below, and wedges that touch its wall."""
     axis = bore.direction
     x, y = bore.across
     foot = float(bore.point @ axis)
@@ -85,8 +87,8 @@ def _around(part: Any, bore: Region) -> Iterator[Any]:
     slope = bore.slope if bore.kind == "cone" else 0.0
     at = bore.point + bore.span[0] * axis
     for i in range(n):
-        # A wedge lies between the half planes at angles a and b, and beyond the plane that touches the wall at m
-        # between them: its normal leans back against the axis by the slope of a cone.
+        # A wedge lies between half planes at angles a and b, and outside the plane that touches the wall at m between
+        # them. The normal of that plane tilts against the axis by the slope of a cone.
         a, b, m = (2.0 * np.pi * (i + off) / n for off in (-0.5, 0.5, 0.0))
         right = -np.sin(a) * x + np.cos(a) * y
         left = np.sin(b) * x - np.cos(b) * y

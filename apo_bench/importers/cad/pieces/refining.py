@@ -1,7 +1,7 @@
-"""Cut the parts of hollow free shapes on until their hulls keep out of the space around the solid, [mm].
+"""Cut hollow free-form parts further until their hulls keep out of the free space around the solid, [mm].
 
-A part becomes one piece, its convex hull. Where the surface of the solid lies inside of that hull, the hull fills free
-space that other solids may need. So the part is cut through the deepest such point, again and again.
+Each part becomes its convex hull. Where the surface of the solid lies inside that hull, the hull fills free space that
+other solids may need. So the part is cut at the deepest such point, repeatedly.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,41 +17,42 @@ from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.solids import Mesh, convert_to_mesh, find_square_axes
 
 _DEEP_MM = 0.02
-"""How deep the surface may lie in a hull where other solids come near."""
+"""Depth of the surface inside a hull that is allowed where other solids come near."""
 _FAR = 0.005
-"""How deep it may lie elsewhere, as a share of the size."""
+"""Depth that is allowed elsewhere, as a share of the size."""
 _FLUSH_MM = 0.004
-"""A point that is less deep lies on the hull."""
+"""A point at a smaller depth lies on the hull."""
 _NEAR_MM = 1.0
-"""Other solids come near within this distance."""
-_ALONE = 150
-_TOGETHER = 300
-"""The largest number of pieces of a solid alone, and of one among others; half as many more beyond its flat cuts."""
+"""Distance within which other solids come near."""
+_ALONE = 150  # pieces of a solid that is imported alone
+_TOGETHER = 300  # pieces of a solid in an assembly
+"""Limits on the number of pieces; if flat cuts alone give many, half the limit is added to their number."""
 _AT_ONCE = 2_000_000
-"""The number of distances that are computed together, which bounds the memory."""
+"""Distances that are computed at once, to limit the memory."""
 
 
 class Beside(NamedTuple):
-    """Where a solid must be exact."""
+    """The surroundings of a solid, which decide where its pieces must be exact."""
 
     size: float
-    """Of the solid."""
+    """Size of the solid."""
     flats: Array
     """Planes of its flat faces, (k, 4)."""
     others: Any = None
-    """A tree of points of other solids that come near, on their way and in their place; None: unknown."""
+    """KD tree of the points of other solids that come near, at their places or on their paths; None: unknown."""
 
     def allowed_depth(self, points: Array, mesh: Mesh, planes: Array) -> Array:
-        """Return how deep each point of the surface, (k, 3), of a part may lie in its hull, (k,).
+        """Return the allowed depth of points of a part's surface, (k, 3), in its hull, (k,).
 
         Args:
-            planes: Of the hull.
+            mesh: The part.
+            planes: Planes of the hull.
         """
         is_near = self.is_near(points) | (len(points) > 0 and self._reaches(mesh.corners, planes))
         return np.where(is_near, _DEEP_MM, max(_FAR * self.size, _DEEP_MM))
 
     def _reaches(self, corners: Array, planes: Array) -> bool:
-        """Whether others come into the hull of corners, (k, 3)."""
+        """Whether points of other solids are inside the hull of corners, (k, 3)."""
         if self.others is None:
             return False
         points = self.others.data
@@ -59,29 +60,30 @@ class Beside(NamedTuple):
         return bool((depths(points, planes) > _DEEP_MM).any())
 
     def is_near(self, points: Array) -> Any:
-        """Return where others may come near, (k,)."""
+        """Return which points have other solids near, (k,); all if the others are unknown."""
         if self.others is None:
             return np.ones(len(points), dtype=bool)
         return np.isfinite(self.others.query(points, distance_upper_bound=_NEAR_MM)[0])
 
 
 class _Fault(NamedTuple):
-    """Where a part differs most from its hull."""
+    """The point at which a part deviates most from its hull."""
 
     share: float
-    """Of the allowed depth; 0 if it is less."""
+    """Its depth over the allowed depth; 0 if no depth exceeds the allowed one."""
     point: Array
     normals: Array
-    """Of the sides there, (k, 3)."""
+    """Normals of the sides at the point, (k, 3)."""
 
 
 def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
-    """Cut parts on where they are too hollow, the most hollow first, up to the largest number of pieces.
+    """Cut parts further at their worst faults, the worst first, up to the largest number of pieces.
 
     Args:
-        volume: Of the whole solid.
+        volume: Of the whole solid, [mm^3].
+        hair: Distance of a cut from its plane, [mm].
     """
-    ticket = count()
+    ticket = count()  # breaks ties, as parts cannot be compared
     queue = [(-fault.share, next(ticket), part, fault) for part in parts for fault in [_worst_fault(part, beside)]]
     heapify(queue)
     done = 0
@@ -101,6 +103,7 @@ def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair:
 
 
 def _worst_fault(part: CutPart, beside: Beside) -> _Fault:
+    """Return the worst fault of a part, over corners and middles of edges and sides."""
     mesh = convert_to_mesh(part.body)
     planes = _planes(mesh.corners)
     middles = [mesh.corners[each].mean(axis=1) for each in (mesh.edges, mesh.triangles)]
@@ -115,7 +118,7 @@ def _worst_fault(part: CutPart, beside: Beside) -> _Fault:
 
 
 def _normals_at(mesh: Mesh, point: Array) -> Array:
-    """Normals of the sides at a corner, or at the middle of an edge or a side."""
+    """Return the normals of the sides at a corner, or at the middle of an edge or a side, (k, 3)."""
     sides = np.linalg.norm(mesh.corners[mesh.triangles] - point, axis=2).min(axis=1) < 1e-9
     edge = np.linalg.norm(mesh.corners[mesh.edges].mean(axis=1) - point, axis=1) < 1e-9
     sides[mesh.neighbours[edge].ravel()] = True
@@ -126,7 +129,7 @@ def _normals_at(mesh: Mesh, point: Array) -> Array:
 
 
 def _planes(corners: Array) -> Array:
-    """Planes of the sides of a hull, n . x = d, each once, (k, 4); none of a flat one."""
+    """Return the planes n . x = d of the sides of a hull, without duplicates, (k, 4); none if the hull is flat."""
     try:
         planes = ConvexHull(corners).equations * [1.0, 1.0, 1.0, -1.0]
     except (QhullError, ValueError):
@@ -135,18 +138,24 @@ def _planes(corners: Array) -> Array:
 
 
 def _cut_at(part: CutPart, fault: _Fault, least: float, hair: float) -> list[CutPart]:
-    """The part cut through its most hollow point along the plane that leaves the least hulls."""
+    """Cut a part through its worst point along the plane whose halves have the least hull volume.
+
+    Args:
+        least: Smaller bodies are rounding, [mm^3].
+        hair: Distance of a cut from its plane, [mm].
+    """
     normals = fault.normals
     if len(normals) > 1:
         mean = normals.mean(axis=0)
         x, y = find_square_axes(mean / max(float(np.linalg.norm(mean)), 1e-12))
         _, first = np.unique(np.round(normals, 3), axis=0, return_index=True)
+        # Candidate normals: those at the point, the axes of the frame, and planes that contain the mean normal.
         normals = np.array([*normals[np.sort(first)][:3], *np.eye(3), x, y, (x + y) / 2**0.5, (x - y) / 2**0.5])
     return cut_through(part, fault.point, normals, least, hair)
 
 
 def depths(points: Array, planes: Array) -> Array:
-    """Return how deep points, (k, 3), are below the nearest plane n . x = d, (p, 4), of a hull; negative outside."""
+    """Return the depth of points, (k, 3), below the nearest plane of a hull, n . x = d, (p, 4); negative outside."""
     many = max(1, _AT_ONCE // max(len(planes), 1))
     chunks = [points[i : i + many] for i in range(0, len(points), many)]
     return np.concatenate([np.zeros(0), *((planes[:, 3] - each @ planes[:, :3].T).min(axis=1) for each in chunks)])

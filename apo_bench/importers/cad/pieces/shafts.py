@@ -1,4 +1,4 @@
-"""Give pieces of round shafts the corners that their walls need, or make them true cylinders, [mm]."""
+"""Refine the corners of pieces of round shafts to the fitted wall, or make the pieces true cylinders, [mm]."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -12,19 +12,23 @@ from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
-"""A gap between corners of a ring that is wider than most by this factor belongs to no wall."""
+"""A gap between corners of a ring that is wider than the median by this factor is no part of the wall."""
 
 
 def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
-    """Return a piece, (k, 3), with the corners on shafts that walls need: new ones on whole circles, else more."""
+    """Return the corners of a piece, (k, 3), with rings of corners on shafts refined to the fitted wall.
+
+    Whole circles of corners are replaced by evenly spaced ones; arcs get further corners in between.
+    """
     added = []
     dropped = np.zeros(len(corners), dtype=bool)
+    # The shaft with most corners first.
     for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):
         height, _, angle = shaft.polar(corners)
         on = _on_wall(corners, shaft) & ~dropped
         if on.sum() < 3:
             continue
-        # Rings of corners, level by level. New ones lie on the true circle: between two sides more of them bring the
+        # Corners form rings, one for each height. New corners lie on the true circle, so that more of them bring the
         # sides nearer to the wall.
         count = count_sides(1e-3 * max(shaft.radii))
         for h in np.unique(np.round(height[on], 3)):
@@ -41,40 +45,47 @@ def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
 
 
 def _on_wall(corners: Array, shaft: Region) -> Any:
+    """Return which corners, (k, 3), are on the wall of a shaft, (k,); the tip of a cone does not count."""
     on = shaft.is_on_wall(corners, max(1e-5 * max(shaft.radii), SAME_CORNER_MM))
     return on & (shaft.polar(corners)[1] > SAME_CORNER_MM)
 
 
 def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
-    """Angles of the corners that a wall needs beyond those of a ring, and whether they stand for all of it."""
+    """Return the angles of the corners to add to a ring, and whether they replace the whole ring.
+
+    Args:
+        ring: Angles of the corners of the ring, ascending, [rad].
+        count: Corners of a whole circle.
+    """
     if len(ring) < 3:
         return ring[:0], False
     gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))
     usual = float(np.median(gaps))
     if len(ring) >= 6 and gaps.max() < _WIDER * usual:
         return 2.0 * np.pi * (np.arange(count) + 0.5) / count, True
-    # A wall that is part of a circle: each of its gaps is cut into equal ones, none wider than a side may be.
+    # An arc: divide each of its gaps evenly so that none is wider than a side may be.
     many = np.ceil(gaps / (2.0 * np.pi / count) - 1e-9).astype(int)
     near = zip(*(each[gaps < _WIDER * usual] for each in (ring, gaps, many)), strict=True)
     return np.concatenate([ring[:0], *(a + gap * np.arange(1, n) / n for a, gap, n in near)]), False
 
 
 def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:
-    """Pieces, as true cylinders where all of their corners are on the ends of one."""
+    """Yield the pieces, [m], with those whose corners are all on the two ends of a cylinder made true cylinders."""
     cylinders = [s for s in shafts if s.kind == "cylinder" and THINNEST_M <= 1e-3 * s.radii[0] <= WIDEST_M]
     for piece in pieces:
         yield next((whole for shaft in cylinders if (whole := _as_cylinder(piece, shaft)) is not None), piece)
 
 
 def _as_cylinder(piece: Hull, shaft: Region) -> Hull | None:
+    """Return a piece as a true cylinder, [m]; None if some corner is not on the two end circles of the shaft."""
     corners = 1e3 * piece.corners
     radius = shaft.radii[0]
     height, distance, _ = shaft.polar(corners)
     low = float(height.min())
     high = float(height.max())
-    if len(corners) < 16 or 5e-4 * (high - low) < THINNEST_M:
+    if len(corners) < 16 or 5e-4 * (high - low) < THINNEST_M:  # too few corners for a round piece, or too short
         return None
-    # Every corner is on one of two level circles of the wall: the hull is a prism that stands for the cylinder.
+    # All corners are on two level circles of the wall, so the hull is a prism that approximates the cylinder.
     level = np.minimum(height - low, high - height) < SAME_CORNER_MM
     if not (level & (np.abs(distance - radius) < 1e-5 * radius + 1e-5)).all():
         return None

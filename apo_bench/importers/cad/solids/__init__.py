@@ -1,4 +1,4 @@
-"""Solids of CAD files: meshes, regions of their surface, names, lengths in mm."""
+"""Solids as CAD files hold them: meshes, regions of their surface, copies and names; lengths in mm."""
 
 from apo_bench.importers.cad.solids.bodies import convert_to_manifold, convert_to_mesh, simplify_body
 from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, find_connected_groups

@@ -1,4 +1,4 @@
-"""Meshes as bodies of manifold3d, and back."""
+"""Convert meshes to manifold3d bodies and back."""
 
 from typing import Any
 
@@ -8,12 +8,12 @@ import numpy as np
 from apo_bench.importers.cad.solids.mesh import Mesh
 
 _FLAT = 1e-6
-"""Corners this near to a flat piece, in parts of the size, are left out of it."""
+"""Corners within this distance of a flat face are left out inside it, as a share of the size."""
 
 
 def convert_to_manifold(mesh: Mesh) -> Any:
     """Return a mesh as a body of manifold3d."""
-    # Copies, as it takes no arrays that are only to be read.
+    # Copies, as manifold3d takes no read-only arrays.
     corners = np.array(mesh.corners, order="C")
     return manifold3d.Manifold(manifold3d.Mesh64(corners, np.array(mesh.triangles, dtype=np.uint64, order="C")))
 
@@ -25,5 +25,5 @@ def convert_to_mesh(body: Any) -> Mesh:
 
 
 def simplify_body(mesh: Mesh) -> Mesh:
-    """Return a closed mesh without corners in its flat pieces."""
+    """Return a closed mesh without needless corners in its flat faces."""
     return convert_to_mesh(convert_to_manifold(mesh).simplify(_FLAT * mesh.extent))

@@ -1,4 +1,4 @@
-"""A triangle mesh and what follows from its triangles: sides, neighbours, volume."""
+"""A triangle mesh and quantities that follow from it: edges, neighbours, volume."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from apo_bench.geometry import Array
 @final
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles with common corners, [mm]; most meshes are closed."""
+    """Triangles that share corners, [mm]; most meshes are closed."""
 
     corners: Array
-    """(k, 3)."""
+    """(k, 3), coordinates."""
     triangles: Any
-    """(t, 3), whole numbers, counter-clockwise seen from outside."""
+    """(t, 3), indices of corners, counter-clockwise seen from outside."""
 
     @cached_property
     def across(self) -> Array:
@@ -30,60 +30,64 @@ class Mesh:
 
     @cached_property
     def volume(self) -> float:
-        """Negative if it is inside out, [mm^3]."""
+        """The enclosed volume, negative if normals point inwards, [mm^3]."""
         # Divergence theorem: the sum of the tetrahedra from one point to every triangle, a . (b - a) x (c - a) / 6.
         middle = self.corners.mean(axis=0)
         return float(((self.corners[self.triangles[:, 0]] - middle) * self.across).sum() / 6.0)
 
     @cached_property
     def extent(self) -> float:
-        """The longest side of the aligned box around it."""
+        """The longest side of the axis-aligned bounding box, [mm]."""
         return float(np.ptp(self.corners[self.triangles.ravel()], axis=0).max()) if len(self.triangles) else 0.0
 
     @cached_property
     def sides(self) -> Any:
-        """Directed edges of the triangles, (3 t, 2): those from corner 0 to 1 first, then 1 to 2, then 2 to 0."""
+        """Directed edges of the triangles, (3 t, 2): from corner 0 to 1 of all triangles, then 1 to 2, then 2 to 0."""
         return np.concatenate([self.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
 
     @cached_property
     def twins(self) -> Any:
-        """Rows of `sides` that are one edge of a closed mesh, (e, 2)."""
+        """Pairs of rows of `sides` that are the same edge of a closed mesh, (e, 2)."""
         low, high = np.sort(self.sides, axis=1).T
         return np.lexsort((high, low)).reshape(-1, 2)
 
     @cached_property
     def neighbours(self) -> Any:
-        """Pairs of triangles with a common edge, (e, 2), of a closed mesh; the edge is directed as in the first."""
+        """The two triangles at each edge of a closed mesh, (e, 2); the edge is directed as in the first."""
         return self.twins % len(self.triangles)
 
     @cached_property
     def edges(self) -> Any:
-        """The corners of these edges, (e, 2)."""
+        """The two corners of each edge, (e, 2), in the order of `neighbours`."""
         return self.sides[self.twins[:, 0]]
 
     @cached_property
     def is_closed(self) -> bool:
-        """Whether each edge has two triangles."""
+        """Whether every edge has exactly two triangles."""
         counts = np.unique(np.sort(self.sides, axis=1), axis=0, return_counts=True)[1]
         return len(self.triangles) > 3 and bool((counts == 2).all())
 
     def part(self, triangles: Any) -> "Mesh":
-        """Return the mesh of some of the triangles, with the corners that they use, in their order."""
+        """Return the mesh of some triangles, with only the corners that they use, in the same order."""
         used, index = np.unique(self.triangles[triangles], return_inverse=True)
         return Mesh(self.corners[used], index.reshape(-1, 3))
 
     def flip(self) -> "Mesh":
-        """Return the mesh inside out."""
+        """Return the mesh with reversed orientation."""
         return Mesh(self.corners, self.triangles[:, ::-1])
 
 
 def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
-    """Return one mesh of all triangles; meshes share no corner."""
+    """Return one mesh of all triangles; corners of different meshes are not merged."""
     offsets = np.cumsum([0, *(len(mesh.corners) for mesh in meshes[:-1])])
     triangles = [mesh.triangles + offset for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.corners for mesh in meshes]), np.concatenate(triangles))
 
 
 def find_connected_groups(pairs: Any, count: int) -> tuple[int, Any]:
-    """Return how many groups pairs, (p, 2), make of 0 ... count - 1, and the group of each, (count,)."""
+    """Return the number of connected groups of 0 ... count - 1, and the group of each, (count,).
+
+    Args:
+        pairs: (p, 2), connected numbers.
+    """
     return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)

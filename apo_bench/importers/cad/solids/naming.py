@@ -1,4 +1,4 @@
-"""Names of faces and parts of CAD files, the same for one file each time."""
+"""Name the faces and parts of CAD files, so that a file gives the same names each time."""
 
 from collections import Counter
 from collections.abc import Container, Mapping, Sequence
@@ -15,17 +15,17 @@ from apo_bench.importers.cad.solids.region import Region
 from apo_bench.io import clean
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
-_LONGEST_PART_NAME = 48
-_LONGEST_TITLE = 200
+_LONGEST_PART_NAME = 48  # characters
+_LONGEST_TITLE = 200  # characters
 _GRID = 1e-4
-"""Positions are compared on this grid, in parts of the size, which hides rounding."""
+"""Grid on which positions are compared, as a share of the size, to hide rounding."""
 
 
 def name_regions(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
     """Name regions: `pz`, the outermost face along +z, `pz2` ..., `flat1`, `hole1`, `shaft1`, `cone1`.
 
-    Of one kind the outermost one comes first, of round ones the widest, then by place. Free surfaces and walls that do
-    not go all the way round have no name.
+    Faces of one kind are numbered from the outermost plane or the widest wall, then by place. Free-form surfaces and
+    walls that do not go all the way round get no name.
     """
     stems = [_stem(region) for region in regions]
     numbers = Counter[str]()
@@ -42,10 +42,13 @@ def name_regions(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
 def rename_faces(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     """Rename some faces; `+z` stands for `pz`, `-z` for `nz`.
 
+    Args:
+        names: Present name -> new name.
+
     Raises:
         InputError: No face has the name, or two would have one.
     """
-    signs = {"+": "p", "-": "n"}
+    signs = {"+": "p", "-": "n"}  # as in the options of commands
     new_names = {signs.get(old[:1], old[:1]) + old[1:]: new for old, new in names.items()}
     have = list(raw.named())
     rule = f"a letter, then letters, digits and underscores, {LONGEST_FACE_NAME} at most, not beginning with auto_"
@@ -71,29 +74,29 @@ def make_part_name(text: str, used: Container[str]) -> str:
 
 
 def _latin(text: str) -> str:
-    """A text in letters, digits and underscores; empty if a letter has no Latin form."""
+    """Return a text in ASCII letters, digits and underscores; empty if a letter has no Latin form."""
     plain = ""
     for c in normalize("NFKD", text):
         folded = c if c.isascii() else c.casefold()
         if not folded.isascii() and c.isalnum():
             return ""
-        if not combining(c):
+        if not combining(c):  # accents are dropped
             plain += "".join(each if each.isascii() and each.isalnum() else "_" for each in folded)
     return plain[:_LONGEST_PART_NAME]
 
 
 def clean_title(text: str) -> str:
-    """Return a name of a CAD file as one line that can be printed."""
+    """Return a name of a CAD file as one printable line."""
     return clean(text)[:_LONGEST_TITLE]
 
 
 def find_free_name(name: str, used: Container[str]) -> str:
-    """Return the name, or the first unused one with a number behind it."""
+    """Return the name, or if it is taken, the name with the first free number."""
     return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
 def _stem(region: Region) -> str:
-    """The beginning of a name; empty for a region without one."""
+    """Return the name of a region without its number; empty for a region that gets no name."""
     if region.kind == "plane":
         axis = int(np.abs(region.direction).argmax())
         side = ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
@@ -103,7 +106,7 @@ def _stem(region: Region) -> str:
 
 
 def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
-    """How far out a plane is, or how wide a wall, then its lowest corner."""
+    """Return the sort key of a region: outermost plane or widest wall first, then by its lowest corner."""
     low = mesh.corners[np.unique(mesh.triangles[region.triangles])].min(axis=0)
     first = float(region.direction @ region.point) if region.kind == "plane" else max(region.radii)
     grid = _GRID * mesh.extent

@@ -1,4 +1,4 @@
-"""A solid of a CAD file: its mesh, its faces, and the places where the file has it, [mm]."""
+"""A solid of a CAD file with its mesh, its faces and all places of its copies, [mm]."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,40 +12,41 @@ from apo_bench.importers.cad.solids.mesh import Mesh
 from apo_bench.importers.cad.solids.region import Region
 
 Rgb = tuple[float, float, float]
-"""0 to 1."""
+"""Red, green and blue, 0 to 1."""
 _SAME_SHAPE = 2e-6
-"""Solids are the same if their corners are, within this part of their size."""
+"""Solids have the same shape if their corners agree within this share of their size."""
 
 
 class SolidPlace(NamedTuple):
-    """One of the places at which a file has a solid."""
+    """The pose of one copy of a solid in a file."""
 
     name: str
     T: Array
-    """Of the frame of the solid in that of the file, (4, 4), [mm]."""
+    """(4, 4), frame of the file from frame of the solid, [mm]."""
     color: Rgb | None = None
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class RawSolid:
-    """One solid of a file."""
+    """One solid of a file, with all of its copies."""
 
     name: str
     mesh: Mesh
     places: tuple[SolidPlace, ...]
-    """Where the file has it."""
+    """The places of its copies."""
     repairs: tuple[str, ...] = ()
-    """One sentence for each."""
+    """Repairs of the mesh, one phrase each."""
     regions: tuple[Region, ...] = ()
-    """Its faces, once they are found."""
+    """Its faces; empty until they are found."""
 
     def named(self) -> Mapping[str, Region]:
+        """Return the named regions by name."""
         return {region.name: region for region in self.regions if region.name}
 
 
 def merge_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
-    """Return solids of different shape, each with the places of all that are the same."""
+    """Return the solids of different shape, each with the places of all copies."""
     different: list[RawSolid] = []
     for new in solids:
         for i, old in enumerate(different):
@@ -60,7 +61,7 @@ def merge_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
 
 
 def _transform_onto(a: Mesh, b: Mesh) -> Array | None:
-    """How the first one is moved onto the second, which has the same triangles in the same order; else None."""
+    """Return the pose, (4, 4), that moves mesh a onto mesh b; None if they differ in shape or order of triangles."""
     are_many = len(a.corners) == len(b.corners) and len(a.triangles) == len(b.triangles)
     if not are_many or abs(a.volume - b.volume) > 1e-4 * abs(a.volume):
         return None
@@ -72,6 +73,6 @@ def _transform_onto(a: Mesh, b: Mesh) -> Array | None:
     if np.abs(P @ R.T - Q).max() > _SAME_SHAPE * max(a.extent, float(np.abs(q).max())):
         return None
     T = np.eye(4)
-    T[:3, :3] = np.where(np.abs(R) < 1e-7, 0.0, R)
+    T[:3, :3] = np.where(np.abs(R) < 1e-7, 0.0, R)  # rounding noise becomes exact zeros
     T[:3, 3] = q.mean(axis=0) - T[:3, :3] @ p.mean(axis=0)
     return T

@@ -1,4 +1,4 @@
-"""A face of a mesh: the triangles on one plane, cylinder or cone, and its parameters."""
+"""A region: the triangles of a mesh on one plane, cylinder or cone, with the parameters of that surface."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,11 +10,14 @@ from apo_bench.geometry import WHOLE_TURN, Array
 
 RegionKind = Literal["plane", "cylinder", "cone", "other"]
 SAME_CORNER_MM = 2e-4
-"""Corners of a piece nearer to each other than this are one."""
+"""Corners of a piece nearer to each other than this are the same."""
 
 
 def find_square_axes(direction: Array) -> tuple[Array, Array]:
-    """Return two unit vectors square to a unit vector z: x from the frame's axis that is farthest from z, y = z x x."""
+    """Return two unit vectors x, y with x, y, z right-handed, for a unit vector z.
+
+    x is the projection of the frame's axis that is farthest from z.
+    """
     x = np.eye(3)[int(np.abs(direction).argmin())]
     x = x - (x @ direction) * direction
     x /= np.linalg.norm(x)
@@ -24,27 +27,27 @@ def find_square_axes(direction: Array) -> tuple[Array, Array]:
 @final
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A face: triangles that lie on one plane, cylinder or cone, or on none of them."""
+    """Triangles that lie on one plane, cylinder or cone, or on a free-form surface."""
 
     kind: RegionKind
     triangles: Any
-    """Which of the mesh, ascending."""
+    """Indices of triangles of the mesh, ascending."""
     name: str = ""
     direction: Array = field(default_factory=lambda: np.zeros(3))
-    """The outward normal of a plane, the axis of a round one."""
+    """The outward normal of a plane, or the axis of a round region; unit vector."""
     point: Array = field(default_factory=lambda: np.zeros(3))
-    """Of a plane; of an axis, the foot of the origin."""
+    """A point of the plane; for a round region the foot of the origin on the axis."""
     span: tuple[float, float] = (0.0, 0.0)
-    """Of a round one, along the axis from `point`."""
+    """The two ends of a round region, along the axis from `point`."""
     radii: tuple[float, float] = (0.0, 0.0)
-    """At both ends of the span."""
+    """The radii at the two ends of the span."""
     hole: bool = False
     turn: float = WHOLE_TURN
-    """How far around the axis it reaches, [rad]."""
+    """The angle about the axis that the region covers, [rad]."""
     sides: int = 0
-    """How many flat ones a whole turn of it had in the file; 0: that is not known, or it is no mesh."""
+    """The number of facets around a full turn in a mesh file; 0: unknown or not from a mesh."""
     square: bool = False
-    """Whether both ends are level circles, so that pieces can be rebuilt around it."""
+    """Whether both ends are circles square to the axis, so that pieces can be rebuilt around the wall."""
 
     @property
     def is_round(self) -> bool:
@@ -57,28 +60,28 @@ class Region:
 
     @property
     def slope(self) -> float:
-        """By how much the radius grows along the axis."""
+        """The increase of the radius per length along the axis."""
         return (self.radii[1] - self.radii[0]) / (self.span[1] - self.span[0])
 
     @cached_property
     def across(self) -> tuple[Array, Array]:
-        """Two directions across the axis."""
+        """Two unit vectors across the axis."""
         return find_square_axes(self.direction)
 
     @property
     def ends(self) -> Array:
-        """Where the axis of a round one enters and leaves it, (2, 3)."""
+        """The points of the axis at both ends of a round region, (2, 3)."""
         return self.point + np.outer(self.span, self.direction)
 
     @cached_property
     def box(self) -> Array:
-        """The aligned box around a round one: its lowest and highest corner, (2, 3)."""
+        """The axis-aligned bounding box of a round region: lowest and highest corner, (2, 3)."""
         # A circle of radius r across a unit axis z reaches r sqrt(1 - z_k^2) along the k-th axis of the frame.
         reach = max(self.radii) * np.sqrt(np.maximum(1.0 - self.direction**2, 0.0))
         return np.array([self.ends.min(axis=0) - reach, self.ends.max(axis=0) + reach])
 
     def polar(self, points: Array) -> tuple[Array, Array, Array]:
-        """Return height along the axis, distance from it, angle around it, of points (k, 3)."""
+        """Return height along the axis, distance from the axis and angle about it of points (k, 3), each (k,)."""
         x, y = self.across
         off = points - self.point
         return off @ self.direction, np.hypot(off @ x, off @ y), np.arctan2(off @ y, off @ x)
@@ -87,12 +90,12 @@ class Region:
         return self.radii[0] + self.slope * (height - self.span[0])
 
     def is_on_wall(self, points: Array, near: float) -> Any:
-        """Return which points, (k, 3), are this near to the wall, between its ends."""
+        """Return which points, (k, 3), are within `near` of the wall and between its ends, (k,)."""
         height, distance, _ = self.polar(points)
         within = (height > self.span[0] - SAME_CORNER_MM) & (height < self.span[1] + SAME_CORNER_MM)
         return within & (np.abs(distance - self.radius_at(height)) < near)
 
     def around(self, height: float, radius: float, angle: Array) -> Array:
-        """Return points at angles around the axis, (k, 3)."""
+        """Return points at angles about the axis, [rad], at a height along it and a radius, (k, 3)."""
         x, y = self.across
         return self.point + height * self.direction + radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))

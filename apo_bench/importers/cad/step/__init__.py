@@ -1,1 +1,1 @@
-"""STEP files become solids whose faces have the parameters of the file, [mm]."""
+"""Read STEP files as solids whose faces have the exact parameters of the file, [mm]."""

@@ -1,4 +1,4 @@
-"""Solids of a STEP file as faces of a B-rep: their surfaces, and triangles by Open CASCADE, [mm]."""
+"""Read the solids of a STEP file as B-rep faces: surfaces, and triangles by Open CASCADE, [mm]."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,11 +14,11 @@ from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.importers.cad.step.tree import matrix_of, read_leaves
 
 _TRIANGLES_RAD = 0.2
-"""The angle between neighbours on round walls, the same on walls around one axis."""
+"""Angle between neighbouring triangles on round walls, the same for all walls around one axis."""
 _SAGITTA = 1e-2
-"""The largest distance of triangles from the surface, as a share of the size of the solid."""
+"""Largest distance of triangles from the surface, as a share of the size of the solid."""
 _SPLINE_MM = 5e-4
-"""A spline this near to a plane, a cylinder or a cone is one."""
+"""A spline within this distance of a plane, a cylinder or a cone is taken as such."""
 
 
 def read_solids(path: Path) -> list[BrepSolid]:
@@ -29,12 +29,17 @@ def read_solids(path: Path) -> list[BrepSolid]:
     """
     shapes: dict[Any, tuple[str, Any, list[SolidPlace]]] = {}
     for product, shape, place in read_leaves(path):
+        # Copies share their TShape, so each shape is read once.
         shapes.setdefault(shape.TShape(), (product, shape, []))[2].append(place)
     return [solid for name, shape, places in shapes.values() for solid in _solids(name, shape, (*places,))]
 
 
 def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[BrepSolid]:
-    """The solids in a shape, and its shells that belong to none."""
+    """Yield the solids in a shape, and its shells that belong to no solid.
+
+    Args:
+        name: Name of the product; several solids get a number behind it.
+    """
     every = [*_shapes_in(shape, TopAbs.TopAbs_SOLID), *_shapes_in(shape, TopAbs.TopAbs_SHELL, TopAbs.TopAbs_SOLID)]
     if not every and any(_shapes_in(shape, TopAbs.TopAbs_FACE)):
         every = [shape]
@@ -48,7 +53,7 @@ def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[B
 
 
 def _shapes_in(shape: Any, *kinds: Any) -> Iterator[Any]:
-    """Shapes of the first kind, without those inside of the second kind."""
+    """Yield the shapes of the first kind, except those inside shapes of the second kind."""
     explorer = TopExp.TopExp_Explorer(shape, *kinds)
     while explorer.More():
         yield explorer.Current()
@@ -56,6 +61,7 @@ def _shapes_in(shape: Any, *kinds: Any) -> Iterator[Any]:
 
 
 def _face(face: Any) -> BrepFace:
+    """Return a face with its surface and triangles; no triangles if Open CASCADE could not triangulate it."""
     location = TopLoc.TopLoc_Location()
     mesh = BRep.BRep_Tool.Triangulation_s(face, location)
     if mesh is None:
@@ -79,7 +85,7 @@ def _face(face: Any) -> BrepFace:
 
 
 def _elementary(face: Any) -> tuple[Any, float]:
-    """The plane, cylinder or cone of a face, also of a spline, and its largest distance from it; None without one."""
+    """Return the plane, cylinder or cone of a face by Open CASCADE, or None, and the deviation of a spline from it."""
     surface = BRepAdaptor.BRepAdaptor_Surface(face)
     kind = str(surface.GetType()).rsplit("_", 1)[-1]
     if kind in ("Plane", "Cylinder", "Cone"):

@@ -1,4 +1,4 @@
-"""A solid of a B-rep becomes a closed mesh whose triangles belong to faces with the parameters of the file."""
+"""Turn a B-rep solid into a closed mesh whose regions have the surface parameters of the STEP file."""
 
 from pathlib import Path
 from typing import Any
@@ -22,14 +22,14 @@ from apo_bench.importers.cad.solids import (
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane, is_same_surface
 
 _LEVEL = 1e-6
-"""Corners of an end are level within this part of the size."""
+"""Corners of an end within this share of the size are at one height."""
 
 
 def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
-    """Return a solid with its faces, in its own frame.
+    """Return a solid with its regions, in its own frame.
 
     Raises:
-        InputError: A face of it could not be cut into triangles, or its shell is open.
+        InputError: A face could not be triangulated, or its shell is open.
     """
     faces = solid.faces
     is_whole = all(len(face.triangles) for face in faces)
@@ -38,7 +38,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     check_closed(path, mesh)
     repairs = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
     mesh = mesh.flip() if repairs else mesh
-    # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
+    # Neighbouring faces on one surface become one region; from here on `owner` is the region of each triangle.
     neighbours = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
     pairs = [(i, k) for i, k in neighbours.tolist() if i != k and is_same_surface(faces[i], faces[k], mesh.extent)]
     _, group = find_connected_groups(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
@@ -52,7 +52,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
 
 
 def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
-    """The triangles of all faces with common corners, and the face of each."""
+    """Return the triangles of all faces as one mesh with shared corners, and the face of each triangle, (t,)."""
     whole = concatenate_meshes([Mesh(face.corners, face.triangles) for face in faces])
     owner = np.repeat(np.arange(len(faces)), [len(face.triangles) for face in faces])
     mesh, has_three = merge_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
@@ -60,10 +60,10 @@ def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
 
 
 def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> tuple[Mesh, Any]:
-    """With walls between two circles as strips from end to end.
+    """Return the mesh with walls between two circles retriangulated in strips from end to end, and its new `owner`.
 
     Args:
-        owner: The surface of each triangle.
+        owner: Index into `surfaces` of each triangle, (t,).
     """
     for k, wall in enumerate(surfaces):
         mine = np.flatnonzero(owner == k)
@@ -77,9 +77,9 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> 
 
 
 def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
-    """Other triangles, (s, 3), for those of a wall: the sides of the hull of its border, and of the tip of a cone.
+    """Return triangles, (s, 3), that replace those of a wall: the sides of the hull of its border and of a cone's tip.
 
-    None if its ends are not two level circles, nor one and a tip.
+    None if the ends are not two circles square to the axis, nor a circle and a tip.
     """
     near = _LEVEL * mesh.extent
     every = np.unique(mesh.triangles[triangles])
@@ -89,8 +89,8 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
     if (np.minimum(height - height.min(), height.max() - height) > near).any():
         return None
     hull = ConvexHull(points).simplices
-    sides = hull[np.ptp(height[hull], axis=1) > near]
-    # They face as the triangles did: outwards, or towards the axis for a hole.
+    sides = hull[np.ptp(height[hull], axis=1) > near]  # without the two end caps
+    # Orient them as the old triangles: outwards, or towards the axis for a hole.
     across = np.cross(points[sides[:, 1]] - points[sides[:, 0]], points[sides[:, 2]] - points[sides[:, 0]])
     outward = (across * wall.polar(points[sides].mean(axis=1))[2]).sum(axis=1)
     before = (mesh.across[triangles] * wall.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))[2]).sum()
@@ -98,10 +98,12 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
 
 
 def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region:
+    """Return the region of triangles on a surface; None means a free-form surface."""
     if surface is None:
         return Region("other", triangles)
     across = mesh.across[triangles]
     if isinstance(surface, Plane):
+        # The file's normal may point inwards; 1.0 for a face without area.
         sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
         return plane_region(triangles, sign * surface.normal, surface.point)
     _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))

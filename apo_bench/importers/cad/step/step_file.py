@@ -1,4 +1,4 @@
-"""Read a STEP file into raw solids, each shape once with all of its places."""
+"""Read a STEP file as raw solids, each shape once with the places of all copies."""
 
 import re
 from importlib.util import find_spec
@@ -12,8 +12,9 @@ from apo_bench.importers.cad.solids import RawSolid, merge_copies
 from apo_bench.importers.cad.step.from_brep import raw_of
 
 STEP_SUFFIXES = (".step", ".stp")
-_MOST_SOLIDS = 200
-_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
+_MOST_SOLIDS = 200  # in one file
+_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}  # SI prefix of a metre -> unit
+# Name of another unit -> unit.
 _UNIT_NAMES = {
     "INCH": "in",
     "FOOT": "ft",
@@ -25,7 +26,7 @@ _UNIT_NAMES = {
 
 
 def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
-    """Read the solids of a STEP file, each once, with all of its places.
+    """Read the solids of a STEP file, each shape once with the places of all copies.
 
     Raises:
         InputError: The extra is missing, the file cannot be read, or it holds no closed solid of a size for a part.
@@ -61,7 +62,7 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
 
 
 def _unit(raw: bytes) -> str:
-    """The unit of lengths, as the file names it."""
+    """Return the unit of lengths that the file states; mm if it states none."""
     text = raw.decode("latin-1")
     lengths = re.findall(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", text)
     named = re.findall(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", ";".join(lengths))

@@ -1,4 +1,4 @@
-"""Faces of a B-rep, and whether two of them lie on one surface, [mm]."""
+"""Faces of a B-rep, and the test whether two of them lie on one surface, [mm]."""
 
 from typing import Any, NamedTuple
 
@@ -9,32 +9,32 @@ from apo_bench.importers.cad.faces.fitting import Round
 from apo_bench.importers.cad.solids import SolidPlace
 
 _SAME = 1e-6
-"""Surfaces that differ by less, as a share of the size of the solid, are one."""
-_SAME_RAD = 1e-6
+"""Surfaces that differ by less are the same, as a share of the size of the solid."""
+_SAME_RAD = 1e-6  # the same for angles
 
 
 class Plane(NamedTuple):
-    """A plane."""
+    """An infinite plane."""
 
     point: Array
     normal: Array
 
 
 class BrepFace(NamedTuple):
-    """A face of a solid."""
+    """A face of a B-rep solid."""
 
     surface: Plane | Round | None
-    """A surface that can make contacts, or None."""
+    """The surface of a face that can make contacts; None for free-form faces."""
     residual: float
-    """The largest distance of a spline from that surface."""
+    """Largest distance between a spline and that surface."""
     corners: Array
-    """(c, 3)."""
+    """(c, 3), coordinates."""
     triangles: Any
-    """(t, 3), counter-clockwise seen from outside; none if the face cannot be cut into triangles."""
+    """(t, 3), indices of corners, counter-clockwise seen from outside; empty if the face could not be triangulated."""
 
 
 class BrepSolid(NamedTuple):
-    """A solid, or a shell that may be one."""
+    """A solid, or a shell that may enclose one, with the places of its copies."""
 
     name: str
     faces: tuple[BrepFace, ...]
@@ -45,7 +45,7 @@ def is_same_surface(first: BrepFace, second: BrepFace, size: float) -> bool:
     """Whether two faces lie on one plane, cylinder or cone.
 
     Args:
-        size: Of the solid, [mm].
+        size: Size of the solid, [mm].
     """
     near = _SAME * size + 2.0 * (first.residual + second.residual)
     near_rad = _SAME_RAD + near / size
@@ -55,7 +55,7 @@ def is_same_surface(first: BrepFace, second: BrepFace, size: float) -> bool:
         return bool(is_parallel and abs((b.point - a.point) @ a.normal) < near)
     if not (isinstance(a, Round) and isinstance(b, Round)) or np.linalg.norm(np.cross(a.axis, b.axis)) > near_rad:
         return False
-    # The second cone measured from the axis of the first: it may point the other way, and state its radius elsewhere.
+    # Measure the second surface from the axis of the first: its axis may be reversed, and its radius stated elsewhere.
     height, distance, _ = a.polar(b.point[None])
     slope = b.slope * float(np.sign(a.axis @ b.axis))
     radius = a.radius + a.slope * height[0]

@@ -1,4 +1,4 @@
-"""Read the tree of a STEP file by Open CASCADE: shapes with their names, places and colours."""
+"""Read the assembly tree of a STEP file by Open CASCADE: shapes with names, places and colours."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -17,13 +17,13 @@ _NO_NAME = re.compile(
     r"|=>\[.*|NAUO\d*|\d+|SOLID|SHELL|COMPOUND|Next assembly (usage|relationship)|Open CASCADE STEP translator.*",
     re.IGNORECASE,
 )
-"""Names that programs write where a person gave none."""
+"""Names that programs write if the user gave none."""
 _Leaf = tuple[str, Any, SolidPlace]
-"""The name of a part, its shape in its own frame, and one of its places, which may have the name of the part."""
+"""Name of a part, its shape in its own frame, and one of its places, whose name may be that of the part."""
 
 
 def read_leaves(path: Path) -> Iterator[_Leaf]:
-    """Return the shapes that are no assemblies, in the order of the file.
+    """Yield the shapes that are no assemblies, in the order of the file.
 
     Raises:
         ValueError: The file cannot be read.
@@ -42,12 +42,15 @@ def read_leaves(path: Path) -> Iterator[_Leaf]:
 
 
 def _leaves_below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterator[_Leaf]:
-    """Return the leaves of one entry of the tree.
+    """Yield the leaves below one entry of the tree.
 
     Args:
-        product, name: Of the entry around it, for those that have none.
+        label: The entry of the tree.
+        colors: The colour tool of the document.
+        T: (4, 4), pose of the entry's parent in the file, [mm].
+        product, name: Names of the parent's part and place, for entries without a name.
     """
-    part = label
+    part = label  # the entry that a reference stands for
     if XCAFDoc.XCAFDoc_ShapeTool.IsReference_s(label):
         part = TDF.TDF_Label()
         XCAFDoc.XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
@@ -61,7 +64,7 @@ def _leaves_below(label: Any, T: Array, product: str, name: str, colors: Any) ->
         for each in inside:
             yield from _leaves_below(each, here, product, name, colors)
         return
-    # A shape in its own frame, so that all of its copies are one shape, and the place of that frame.
+    # Keep the shape in its own frame, so that all copies share one shape, and put its location into the place.
     placed = XCAFDoc.XCAFDoc_ShapeTool.GetShape_s(part)
     shape = placed.Located(TopLoc.TopLoc_Location())
     of_label = XCAFDoc.XCAFDoc_ColorTool.GetColor_s
@@ -70,19 +73,23 @@ def _leaves_below(label: Any, T: Array, product: str, name: str, colors: Any) ->
 
 
 def _name(label: Any) -> str:
-    """The name that a person gave, or empty."""
+    """Return the name that the user gave, or an empty text."""
     attribute = TDataStd.TDataStd_Name()
     if not label.FindAttribute(TDataStd.TDataStd_Name.GetID_s(), attribute):
         return ""
     text = attribute.Get().ToExtString()
-    with suppress(UnicodeError):  # the letters of a UTF-8 file are read, and by some programs written, byte by byte
+    with suppress(UnicodeError):  # some programs write UTF-8, which Open CASCADE reads byte by byte
         text = text.encode("latin-1").decode("utf-8")
     text = "".join(c if c.isprintable() else " " for c in text).strip()
     return "" if _NO_NAME.fullmatch(text) else text
 
 
 def _color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
-    """The colour of the surface of an entry of the tree or a shape, else that of all of it."""
+    """Return the surface colour of an entry of the tree or a shape, else its general colour; None without one.
+
+    Args:
+        get: Function that reads a colour of the owner, by kind, into a colour object; False if there is none.
+    """
     color = Quantity.Quantity_Color()
     if not any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen)):
         return None

@@ -1,4 +1,4 @@
-"""Fit a noise model to residuals: tails by maximum likelihood, rates of outliers and of misses."""
+"""Fit a noise model to residuals of a pose estimator: tails by maximum likelihood, rates by counting."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -21,43 +21,50 @@ from apo_bench.perception.observation.models import (
 )
 
 _FEWEST = 30
-"""Four numbers are not fitted to fewer errors."""
+"""Least number of errors for a fit of four parameters."""
 _CHANCE = 1.358
-"""95 % quantile of Kolmogorov's distribution."""
+"""95 % quantile of the Kolmogorov distribution."""
 _BANDS = 5
+"""Number of bands of scores, with equally many estimates each."""
 PERCENTILES = (25, 50, 75, 90, 95)
+"""Percentiles at which measured and fitted errors are compared."""
 
 
 class Figures(NamedTuple):
-    """What was measured and what the fitted distribution says, by `PERCENTILES`."""
+    """Goodness of fit of one error component."""
 
     name: str
     unit: str
     observed: Array
+    """(5,), measured percentiles, see `PERCENTILES`."""
     fitted: Array
+    """(5,), percentiles of the fitted distribution."""
     distance: float
-    """Kolmogorov and Smirnov's distance: the largest difference of the two cumulative distributions."""
+    """Kolmogorov-Smirnov distance: the largest difference of the two cumulative distributions."""
     by_chance: float
-    """What it is not above in 95 % of cases, if errors are independent and distributed like that."""
+    """95 % quantile of that distance for independent errors that follow the fitted distribution."""
 
 
 class Band(NamedTuple):
-    """Estimates of similar scores."""
+    """Estimates with similar confidence scores."""
 
     least: float
-    """Score."""
+    """Lowest score in the band."""
     outliers: float
-    """Part of them."""
+    """Fraction of outliers, 0 to 1."""
 
 
 def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
-    """The noise that makes the residuals most likely: shifts of upright inliers, turns of those whose turn is known.
+    """Fit a noise model to residuals by maximum likelihood.
 
-    Errors are taken about the truth, not about their mean: a bias of the estimator is part of their size, and the noise
-    that is drawn has none.
+    Position errors come from upright inliers, rotation errors from inliers whose rotation is unambiguous. Errors are
+    measured from the truth, not from their mean: a bias of the estimator enlarges them, and the drawn noise has none.
+
+    Args:
+        source: Description of the data, for the noise file.
 
     Raises:
-        InputError: Too few inliers, or they are all exactly right.
+        InputError: There are too few inliers, or nearly all are exact.
     """
     found = residuals.found
     upright = residuals.upright
@@ -81,9 +88,14 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
 
 
 def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
-    """The scales and degrees of freedom under which errors (n, 3), all within the limit, are most likely.
+    """Fit scales and degrees of freedom to errors by maximum likelihood.
 
-    The likelihood is that of the limited distribution, so what is missing beyond the limit is no sign of short tails.
+    The likelihood is that of the distribution truncated at the limit, so the cut does not shorten the fitted tails.
+
+    Args:
+        errors: (n, 3), across (two components) and along the camera ray, all within the limit.
+        limit: Truncation of the distribution, in the unit of the errors.
+        name: Name of the errors in error messages.
     """
     from scipy.optimize import minimize
 
@@ -96,6 +108,7 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         )
 
     def surprise(at: Array) -> float:
+        # Mean negative log-likelihood of the truncated distribution.
         split = unpack_tails(at, limit)
         seen = compute_log_density_across(split.across, r).mean() + compute_log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
@@ -115,7 +128,10 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
 
 
 def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
-    """Outlier rates of `_BANDS` as large parts of what was found, the lowest scores first; none without scores."""
+    """Outlier rates of `_BANDS` equally large bands of estimates, lowest scores first.
+
+    Empty if there are too few scores or bands begin with equal scores.
+    """
     found = residuals.found & np.isfinite(residuals.score)
     order = np.argsort(residuals.score[found], kind="stable")
     if len(order) < _BANDS * _FEWEST:
@@ -130,7 +146,7 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
 
 
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
-    """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
+    """Goodness of fit of the four fitted distributions: position and rotation, across and along the ray."""
     shift = measured.shift_mm
     turn = measured.turn_deg
     turned = residuals.turn_deg[residuals.turn_known]
@@ -145,6 +161,7 @@ def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figu
 
 
 def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> Figures:
+    """Compare measured sizes (n,) with a fitted cumulative distribution up to the limit."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
     ordered = np.sort(sizes)

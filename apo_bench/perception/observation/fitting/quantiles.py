@@ -1,4 +1,4 @@
-"""Fit tails to published quantiles, where the estimates themselves are not published."""
+"""Fit an error distribution to published quantiles, where the estimates themselves are not published."""
 
 from collections.abc import Mapping
 
@@ -13,15 +13,15 @@ LOWER_QUARTILE_OF_THREE = 1.10115
 
 
 def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, float], limit: float) -> Split:
-    """The distribution whose quantiles come nearest to those given, by least squares of their logarithms.
+    """Fit a distribution to quantiles, by least squares of their logarithms.
 
     Args:
-        across: Percentile -> size of the error across the ray; two or more.
-        along: Percentile -> size of the error along the ray.
-        limit: No error is longer.
+        across: Percentile -> size of the error across the camera ray; two or more.
+        along: Percentile -> size of the error along the camera ray; two or more.
+        limit: Largest error; the unit is that of the sizes.
 
     Raises:
-        InputError: Too few, or they make no sense.
+        InputError: There are too few quantiles, or they do not grow, or they exceed the limit.
     """
     from scipy.optimize import least_squares
 
@@ -36,6 +36,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
     grid = limit * np.linspace(0.0, 1.0, 801)[1:] ** 2
 
     def off(at: Array) -> Array:
+        # Differences of the log quantiles; each is read off the cumulative distribution on a grid.
         split = unpack_tails(at, limit)
         sizes = [
             np.interp(np.array([*given]) / 100.0, np.maximum.accumulate(cdf(grid)), grid)
@@ -50,6 +51,6 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
 
 
 def round_split(lower_quartile: float, limit: float) -> Split:
-    """A Gaussian, the same in all directions, whose length has this lower quartile."""
+    """The isotropic Gaussian whose length has this lower quartile, truncated at the limit."""
     tail = Tail(lower_quartile / LOWER_QUARTILE_OF_THREE)
     return Split(tail, tail, limit)

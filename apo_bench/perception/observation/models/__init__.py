@@ -1,4 +1,4 @@
-"""Noise models, one a file."""
+"""The noise models of the package, with the cameras and distributions that they share."""
 
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import add_shared_error, floor_covariance

@@ -1,7 +1,7 @@
-"""A camera: the frames of the rays from it to the parts.
+"""A camera of a noise model: the frames of its rays to the parts, and errors stated in these frames.
 
 The camera's axes are those of OpenCV: x to the right, y down, z along the optical axis. The frame of a ray is that of
-the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).
+the camera after the smallest rotation that takes z to the ray. Errors in it are (x, y, along; rx, ry, about).
 """
 
 from dataclasses import dataclass, field
@@ -13,17 +13,19 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, copy_frozen, is_rigid, pose
 
 WORKSPACE_MIDDLE_M = copy_frozen([0.12, 0.0, 0.03], 3)
-"""What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
+"""The point that the default camera looks at, world, [m]: the middle of the area of assemblies on the table."""
 CAMERA_DISTANCE_M = 0.9
+"""Distance of the default camera from that point."""
 CAMERA_ELEVATION_DEG = 40.0
+"""Its elevation above the table."""
 CAMERA_AZIMUTH_DEG = 25.0
-"""How far from there it stands, how high above the table, and how far from the x axis of the world."""
+"""Its azimuth from the x axis of the world."""
 _BEHIND = 1e-9
-"""A ray whose cosine with the optical axis is this near to -1 has no shortest turn."""
+"""A ray whose cosine with the optical axis is this near to -1 has no unique smallest rotation."""
 
 
 def _default_pose() -> Array:
-    """T_world_camera of the default camera, (4, 4): obliquely from above, its x axis level."""
+    """T_world_camera (4, 4) of the default camera, which looks obliquely down; its x axis is horizontal, [m]."""
     up = np.radians(CAMERA_ELEVATION_DEG)
     round_z = np.radians(CAMERA_AZIMUTH_DEG)
     z = -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
@@ -51,13 +53,16 @@ class Camera:
         object.__setattr__(self, "T_world_camera", T)
 
     def rays(self, poses: Array) -> Array:
-        """Unit vectors (n, 3) from the camera to the origin of each part, world frame; on its very place, the axis."""
+        """Unit vectors (n, 3), world frame, from the camera to the origins of poses (n, 4, 4).
+
+        For an origin at the camera itself it is the optical axis.
+        """
         to = poses[:, :3, 3] - self.T_world_camera[:3, 3]
         length = np.linalg.norm(to, axis=1, keepdims=True)
         return np.where(length > 0.0, to / np.where(length > 0.0, length, 1.0), self.T_world_camera[:3, 2])
 
     def frames(self, poses: Array) -> Array:
-        """The frames of the rays, (n, 3, 3), world from ray: the third column is the ray."""
+        """Rotations (n, 3, 3) from the frames of the rays to the world; the third column is the ray."""
         R = self.T_world_camera[:3, :3]
         # The shortest turn from z to the ray r is about k = z x r, with |k| = sin and r_z = cos: Rodrigues' formula
         # I + K + K^2 (1 - cos) / sin^2, where (1 - cos) / sin^2 = 1 / (1 + cos).
@@ -69,14 +74,14 @@ class Camera:
         return np.asarray(R @ np.where(behind, np.diag([1.0, -1.0, -1.0]), shortest))
 
     def twists(self, poses: Array, errors: Array) -> Array:
-        """Body twists (n, 6) of errors that are given in the frames of the rays.
+        """Body twists (n, 6) of errors that are stated in the frames of the rays.
 
-        Turn first, then shift in the frame that is observed: xi = (R_obs^t F d, R^t F w), R_obs = R exp(R^t F w). The
-        twist is thus linear in the error, and with covariance S in the frame of the ray its own is exactly that of
-        `covariance` for that ray, since a turn leaves its own axis where it is.
+        The rotation comes first, then the shift in the observed frame: xi = (R_obs^t F d, R^t F w), with
+        R_obs = R exp(R^t F w). So the twist is linear in the error. If the error has covariance S in the frame of the
+        ray, the twist has exactly the covariance of `covariance` for that ray, as a rotation keeps its own axis.
 
         Args:
-            poses: (n, 4, 4), where the parts are, world frame, [m].
+            poses: (n, 4, 4), true poses, world frame, [m].
             errors: (n, 6), (x, y, along; rx, ry, about), [m, rad].
         """
         frames = self.frames(poses)
@@ -87,14 +92,14 @@ class Camera:
         return np.concatenate([shift, turn[:, 3:]], axis=1)
 
     def covariance(self, seen: Array, errors: Array) -> Array:
-        """The body covariance (n, 6, 6) of errors whose covariance in the frames of the rays is known.
+        """The covariance (n, 6, 6) of body twists, for a covariance stated in the frames of the rays.
 
-        Computed for the rays on which parts are observed, so that nothing of the truth is in it. Those differ from the
-        true ones by the error across over the distance, a thousandth for a millimetre.
+        It uses the rays to the observed poses, so it contains nothing of the truth. They differ from the true rays by
+        the error across over the distance, about a thousandth for a millimetre.
 
         Args:
-            seen: (n, 4, 4), where the parts are observed, world frame, [m].
-            errors: (6, 6) or (n, 6, 6), of (x, y, along; rx, ry, about), [m, rad].
+            seen: (n, 4, 4), observed poses, world frame, [m].
+            errors: (6, 6) or (n, 6, 6), covariance of (x, y, along; rx, ry, about), [m, rad].
         """
         turned = np.swapaxes(seen[:, :3, :3], 1, 2) @ self.frames(seen)
         Q = np.zeros((len(seen), 6, 6))

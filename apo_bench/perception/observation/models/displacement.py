@@ -1,4 +1,4 @@
-"""Displaced poses as an observation, with the covariance that it states."""
+"""Make an observation of displaced poses, with its stated covariance and shared errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,15 +9,15 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError
 from apo_bench.geometry import Array, copy_frozen, pose
 
 COVARIANCE_FLOOR = copy_frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
-"""Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
+"""(6,), smallest standard deviation that an observation states, [m, rad], so that a covariance is invertible."""
 
 
 def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Array, covariance: Array) -> Observation:
-    """Observe every pose at `T exp(xi)`, with the covariance of xi and of the human error, and at least the floor.
+    """Make the observation with poses `T exp(xi)`; it states the covariance of xi plus that of the human error.
 
     Args:
-        xi: (n, 6), body twists; where one is zero the pose is the one that was shown, bit for bit.
-        covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
+        xi: (n, 6), body twists; a zero twist keeps the demonstrated pose bit for bit.
+        covariance: (6, 6) or (n, 6, 6), of xi, [m, rad]; raised to `COVARIANCE_FLOOR` where it is smaller.
     """
     poses = displace(demonstration.poses, xi)
     stated = floor_covariance(covariance + demonstration.human_error_covariance)
@@ -25,7 +25,7 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
 
 
 def displace(poses: Array, xi: Array) -> Array:
-    """`T exp(xi)` of poses (n, 4, 4); where a twist is zero the pose as it is, bit for bit."""
+    """`T exp(xi)` of poses (n, 4, 4) and body twists (n, 6); a zero twist keeps the pose bit for bit."""
     return np.where(np.any(xi, axis=1, keepdims=True)[..., None], poses @ pose.exp(xi), poses)
 
 
@@ -36,20 +36,20 @@ def observe_shared(
     own: Array,
     shared: Callable[[Array], Sequence[SharedError]],
 ) -> Observation:
-    """Every pose observed at `T exp(xi)`, by errors of which operations share most.
+    """Make the observation with poses `T exp(xi)`, where operations share a part of the error.
 
     Args:
-        xi: (n, 6), body twists; where one is zero the pose is the one that was shown, bit for bit.
-        own: (6,), standard deviation of what of xi operations do not share, [m, rad]. Without any, operations would be
-            stated to agree without an error, which no camera does.
-        shared: The poses that are observed, (n, 4, 4) -> what operations share.
+        xi: (n, 6), body twists; a zero twist keeps the demonstrated pose bit for bit.
+        own: (6,), standard deviation of the part of xi that is independent per operation, [m, rad]. If all are 0, no
+            shared error is stated.
+        shared: Observed poses (n, 4, 4) -> shared errors.
     """
     seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
     return add_shared_error(seen, *shared(seen.poses)) if own.any() else seen
 
 
 def add_shared_error(observation: Observation, *shared: SharedError) -> Observation:
-    """An observation that states, in addition to what it states already, errors that operations share."""
+    """The observation with additional shared errors; their covariance is added to that of each operation."""
     stated = np.array(observation.covariance)
     for error in shared:
         stated[list(error.operations)] += error.added(observation.poses)
@@ -57,11 +57,11 @@ def add_shared_error(observation: Observation, *shared: SharedError) -> Observat
 
 
 def floor_covariance(covariance: Array) -> Array:
-    """The least covariance (n, 6, 6) above the given one that says at least `COVARIANCE_FLOOR` in every direction.
+    """Raise covariances (n, 6, 6) to at least `COVARIANCE_FLOOR` in every direction; larger ones stay unchanged.
 
     In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.
     """
-    # C / unit = V diag(w) V^t; directions with w < 1 are surer than the floor, and get w = 1.
+    # C / unit = V diag(w) V^t; directions with w < 1 are below the floor, and get w = 1.
     unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
     w, V = np.linalg.eigh(covariance / unit)
     raised = unit * ((V * np.maximum(w, 1.0)[:, None]) @ np.swapaxes(V, -1, -2))

@@ -1,4 +1,4 @@
-"""Noise that draws from the residuals of a pose estimator."""
+"""Noise that resamples the measured residuals of a pose estimator."""
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -24,9 +24,11 @@ _KINDS = (_INLIER, _TURNED, _OUTLIER, _MISSED)
 _ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
 _COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
 MOST_RESIDUALS = 8000
-"""A file holds no more residuals; of more, every so-many-th is written."""
+"""Rows of a file of residuals, at most; of more residuals every k-th is written."""
 _LARGEST_MM = 1e5
+"""Largest allowed position error in a file."""
 _LARGEST_DEG = 180.01
+"""Largest allowed rotation in a file, with a margin for rounding."""
 
 
 @final
@@ -35,13 +37,13 @@ class Sample:
     """Residuals to draw from, as errors in the frames of rays, [m, rad]; a shift acts in the observed frame."""
 
     inliers: Array
-    """(k, 6), those that are not turned."""
+    """(k, 6), residuals of inliers whose rotation is known."""
     outliers: Array
-    """(m, 6)."""
+    """(m, 6), residuals of outliers."""
     missed: float
-    """Part of all that nothing was found for."""
+    """Fraction of all parts without an estimate."""
     gross: float
-    """Part of those that were found, that are outliers."""
+    """Fraction of outliers among the estimates."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inliers", copy_frozen(self.inliers, None, 6))
@@ -49,18 +51,17 @@ class Sample:
 
     @property
     def covariance(self) -> Array:
-        """(6, 6), of an inlier taken with either sign: its mean square."""
+        """(6, 6), covariance of an inlier with random sign, which is the mean square."""
         return self.inliers.T @ self.inliers / len(self.inliers)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class EmpiricalNoise:
-    """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
+    """Noise that draws each error from measured residuals of a pose estimator, all six components together.
 
-    It is taken as it is or with the opposite sign, both equally often, so that it is 0 in the mean: a bias of the
-    estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
-    is not known, as the part looks the same when turned, are left out.
+    The sign is random, so that the mean is 0: a bias of the estimator becomes part of the spread. Misses and outliers
+    are as frequent as measured. Residuals of inliers with an ambiguous rotation (symmetric parts) are left out.
     """
 
     sample: Sample
@@ -83,7 +84,7 @@ class EmpiricalNoise:
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         n = len(assembly)
         sample = self.sample
-        # Columns of chance: which residual, whether an outlier, whether missed; drawn for all, whatever comes of them.
+        # Columns of chance: choice of the residual, outlier or not, missed or not; always drawn for all operations.
         chance = rng.random((n, 3))
         sign = rng.choice([-1.0, 1.0], (n, 1))
         errors = _picked(sample.inliers, chance[:, 0])
@@ -97,17 +98,17 @@ class EmpiricalNoise:
 
 
 def load_empirical_noise(path: Path, noise_level: NoiseLevel) -> EmpiricalNoise:
-    """The noise model of a file of residuals; a file is read once.
+    """Make the noise model of a file of residuals; an unchanged file is read only once.
 
     Raises:
-        InputError: Anything in the file that is not as described, with the line where it stands.
+        InputError: The file is not valid; the message names the line.
     """
     return EmpiricalNoise(_read_once(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
 
 
 def residuals_text(residuals: Residuals) -> str:
-    """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
-    every = -(-len(residuals.where) // MOST_RESIDUALS)
+    """The text of a file of residuals: one row per part in the truth, [mm, degrees], in the frame of its ray."""
+    every = -(-len(residuals.where) // MOST_RESIDUALS)  # rounded up
     lines = [",".join(_COLUMNS)]
     kinds = np.select(
         [~residuals.found, ~residuals.inlier, ~residuals.turn_known], [_MISSED, _OUTLIER, _TURNED], default=_INLIER
@@ -120,7 +121,7 @@ def residuals_text(residuals: Residuals) -> str:
 
 
 def read_residuals(path: str | Path) -> Sample:
-    """The residuals of a file; see `load_empirical_noise`."""
+    """Read a file of residuals; see `load_empirical_noise`."""
     columns = {name: (name, 1.0) for name in _COLUMNS}
     errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
     for row in read_csv(path, columns, _COLUMNS):
@@ -142,18 +143,20 @@ def read_residuals(path: str | Path) -> Sample:
 
 @lru_cache(maxsize=8)
 def _read_once(path: Path, _changed: int) -> Sample:
+    """Read a file of residuals; `_changed`, its modification time, is only a key of the cache."""
     return read_residuals(path)
 
 
 def _error(row: CsvRow) -> list[float]:
+    """The six error columns of a row, [mm, degrees]."""
     return [row.number(name, _LARGEST_MM if name.endswith("_mm") else _LARGEST_DEG) for name in _ERRORS]
 
 
 def _acting_where_seen(errors: list[list[float]]) -> Array:
-    """Residuals [mm, deg] as the errors (d, w) [m, rad] that `Camera.twists` takes.
+    """Convert residuals (n, 6) [mm, deg] to the errors (d, w) [m, rad] that `Camera.twists` takes.
 
-    There a part that is turned by w is shifted by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d): so d
-    is the shift that was measured, times the inverse of V(-w), and the pose that was estimated comes back exactly.
+    `Camera.twists` shifts a part that it turns by w by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d).
+    So d is the measured shift times the inverse of V(-w), which reproduces the estimated pose exactly.
     """
     # log of the pose with rotation exp(-w) and position d is (V(-w)^-1 d, -w).
     measured = np.array(errors).reshape(-1, 6) * LEVEL_UNITS
@@ -164,4 +167,5 @@ def _acting_where_seen(errors: list[list[float]]) -> Array:
 
 
 def _picked(rows: Array, chance: Array) -> Array:
+    """Select one row (with repetition) for each uniform number of chance, (n,), 0 to 1."""
     return rows[np.minimum((chance * len(rows)).astype(np.int64), len(rows) - 1)]

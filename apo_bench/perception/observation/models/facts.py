@@ -1,4 +1,4 @@
-"""The level of a noise model, and the facts for its sheet."""
+"""The noise level, and the facts that the sheet of a noise model prints."""
 
 from typing import NamedTuple
 
@@ -8,10 +8,12 @@ from apo_bench.geometry import Array
 
 
 class NoiseLevel(NamedTuple):
-    """How much noise: standard deviation per axis."""
+    """The noise level: standard deviation per axis."""
 
     mm: float
+    """Of the position."""
     deg: float
+    """Of the rotation vector."""
 
     def sigma(self) -> Array:
         """The standard deviation of each coordinate of a body twist, (6,), [m, rad]."""
@@ -19,16 +21,16 @@ class NoiseLevel(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """The attribute `FACTS` of a noise model: what its sheet prints. Models that bring none have their docstring."""
+    """The attribute `FACTS` of a noise model, which its sheet prints; without it the sheet prints the docstring."""
 
     title: str
     formula: tuple[str, ...]
     """One line each; L is the level, e are independent standard normal numbers, xi is the body twist."""
     frame: str
     parameters: tuple[str, ...]
-    """`name = value unit: meaning`, one each; numbers are read from the constants that the model uses."""
+    """One `name = value unit: meaning` per parameter; the numbers come from the constants of the model."""
     states: str
-    """Which covariance an observation states, and how that compares with the errors."""
+    """The covariance that an observation states, and how it compares with the errors."""
     notes: tuple[str, ...] = ()
     measured: bool = False
-    """Whether a level multiplies what was measured, instead of being the deviation in mm and degrees."""
+    """True if the level is a factor on measured errors; False if it is the deviation in mm and degrees."""

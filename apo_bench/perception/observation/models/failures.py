@@ -1,6 +1,6 @@
-"""Noise with failures of the camera: some poses are false, with the covariance of right ones.
+"""Noise with camera failures: some observed poses are false, but state the covariance of right ones.
 
-What is false is drawn apart from the noise, so that a later look can repeat it: a model keeps no state.
+Failures are drawn separately from the noise, so that a reobservation can repeat them although a model keeps no state.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,50 +19,55 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 RATE = 0.3
-"""Share of operations that are observed wrongly."""
+"""Default fraction of operations that fail."""
 NEAREST_M = 0.02
+"""Smallest error along the ray."""
 FARTHEST_M = 0.06
-"""An error along the ray."""
+"""Largest error along the ray."""
 VIEW_SHIFT_M = 0.02
+"""Standard deviation of the displacement of a view along each axis."""
 VIEW_TURN_RAD = float(np.radians(5.0))
-"""Standard deviations of the displacement of a view, along and about each axis."""
+"""Standard deviation of the displacement of a view about each axis."""
 _MOST_REPEAT = 0.999
-"""The largest probability that is stated: no number of observations proves more."""
+"""Largest probability of a repeated failure that an observation states."""
 
 
 class FalseViews(NamedTuple):
-    """What is false in one look at n operations."""
+    """The failures in one observation of n operations."""
 
     false: NDArray[np.bool_]
-    """(n,)."""
+    """(n,), True for an operation that failed."""
     poses: Array
-    """(n, 4, 4), where the parts seem to be before any noise, world frame, [m]; the true poses where nothing is."""
+    """(n, 4, 4), false poses of failed operations and true poses of the others, without noise, world frame, [m]."""
 
 
 class Failure(NamedTuple):
-    """A way in which a camera fails, and how often."""
+    """One kind of camera failure, with its rate."""
 
     displace: Callable[[Array, Demonstration, Camera, float, np.random.Generator], None]
-    """(poses (n, 4, 4), shown, camera, rate, rng): replaces those of the poses that are false, in place."""
+    """(poses (n, 4, 4), shown, camera, rate, rng): draws the failed operations and replaces their poses in place."""
     title: str
     formula: str
     notes: tuple[str, ...] = ()
     rate: float = RATE
-    """Share of operations."""
+    """Fraction of operations that fail."""
     by_part: bool = True
-    """Whether operations on different parts fail independently of each other."""
+    """True if operations on different parts fail independently of each other."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CameraFailures:
-    """Isotropic noise about poses some of which are false: a mixture of failures. At level 0 nothing is false."""
+    """Isotropic noise about poses, some of which are false; several kinds of failures can be combined.
+
+    At level 0 nothing fails.
+    """
 
     noise_level: NoiseLevel
     failures: tuple[Failure, ...]
-    """One after the other."""
+    """Applied one after the other."""
     repeat: float = 0.0
-    """Probability that a later look repeats what was false in the first one."""
+    """Probability that a reobservation repeats a failure of the first observation."""
     camera: Camera = field(default_factory=Camera)
 
     def __post_init__(self) -> None:
@@ -72,7 +77,7 @@ class CameraFailures:
 
     @property
     def FACTS(self) -> Facts:
-        """What its sheet prints."""
+        """The facts that its sheet prints."""
         formula = ", or ".join(failure.formula for failure in self.failures)
         notes = [note for failure in self.failures for note in failure.notes]
         return Facts(
@@ -89,7 +94,7 @@ class CameraFailures:
 
     @property
     def by_part(self) -> bool:
-        """Whether errors of operations on different parts are independent."""
+        """True if operations on different parts fail independently of each other."""
         return all(failure.by_part for failure in self.failures)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -98,7 +103,7 @@ class CameraFailures:
     def again(
         self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator, first: np.random.Generator
     ) -> Observation:
-        """A later look.
+        """Draw a reobservation, which can repeat failures of the first observation.
 
         Args:
             first: A fresh copy of the generator that the first observation was drawn from.
@@ -110,7 +115,7 @@ class CameraFailures:
         return self._observe(demonstration, rng, FalseViews(repeated | now.false, poses))
 
     def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
-        """What a first look has wrong: the first draws of `__call__`."""
+        """Draw the failures; these are the first draws of `__call__`, so its generator reproduces them."""
         poses = demonstration.poses.copy()
         if max(self.noise_level) > 0.0 and len(poses):
             for failure in self.failures:
@@ -118,6 +123,7 @@ class CameraFailures:
         return FalseViews(np.abs(poses - demonstration.poses).max(axis=(1, 2), initial=0.0) > 0.0, poses)
 
     def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
+        """Add isotropic noise to the poses of `views`, and state rates of failures."""
         sigma = self.noise_level.sigma()
         xi = rng.standard_normal((len(views.poses), 6)) * sigma
         seeming = replace(demonstration, poses=views.poses)
@@ -129,12 +135,12 @@ class CameraFailures:
 
 
 def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
-    """The operations that are false, each as likely."""
+    """Draw the failed ones of n operations, counted from 0, each with probability `rate`."""
     return [int(k) for k in np.flatnonzero(rng.random(n) < rate)]
 
 
 def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are observed turned by an approximate symmetry, T F; a part without one is observed correctly."""
+    """Turn parts by one of their approximate symmetries, T F; a part without one is observed correctly."""
     assembly = shown.assembly
     for k in draw_failing(len(poses), rate, rng):
         turns = find_approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
@@ -143,19 +149,19 @@ def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _leave_behind(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are observed where they were before the operation moved them."""
+    """Replace poses by those before the operation."""
     before = (shown.start, *compute_placements(shown.assembly, shown.start, shown.poses))
     for k in draw_failing(len(poses), rate, rng):
         poses[k] = before[k][shown.assembly.operations[k].main]
 
 
 def _swap(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """The views of two operations on like parts are exchanged; of any two where no two parts have one shape."""
+    """Exchange the poses of two operations on parts of equal shape, or of any two parts if there are none."""
     assembly = shown.assembly
     parts = [operation.main for operation in assembly.operations]
     free = set(range(len(parts)))
     for k in range(len(parts)):
-        # Both of a pair are false, so each operation starts one with half the rate.
+        # Both operations of a pair fail, so each one starts an exchange with half the rate.
         starts = rng.random() < rate / 2.0
         others = [i for i in sorted(free - {k}) if parts[i] != parts[k]]
         like = [i for i in others if assembly.solids[parts[i]] is assembly.solids[parts[k]]] or others
@@ -166,18 +172,18 @@ def _swap(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _shift_along_ray(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are observed 20 to 60 mm too near or too far, on the ray of the camera."""
+    """Shift parts by 20 to 60 mm along the camera ray, towards the camera or away."""
     rays = camera.rays(poses)
     for k in draw_failing(len(poses), rate, rng):
         poses[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)
 
 
 def _displace_view(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Operations one after the other, as many as the rate says and two at least, share one displacement."""
+    """Displace consecutive operations, a fraction `rate` of all and at least two, by one common displacement."""
     many = min(len(poses), max(2, round(rate * len(poses)))) if rate > 0.0 else 0
     first = int(rng.integers(len(poses) - many + 1))
     error = rng.standard_normal(6) * np.repeat([VIEW_SHIFT_M, VIEW_TURN_RAD], 3)
-    # T -> P exp(e) P^-1 T, P the axes of the camera in the middle of what is displaced.
+    # T -> P exp(e) P^-1 T, P the axes of the camera in the middle of the displaced poses.
     view = slice(first, first + many)
     if many:
         P = camera.T_world_camera.copy()
@@ -222,9 +228,9 @@ PRESETS: Mapping[str, Failure] = MappingProxyType(
         ),
     }
 )
-"""Failures that have a name."""
+"""Name of a failure model -> its kind of failure."""
 
 
 def make_failures(name: str, noise_level: NoiseLevel, rate: float = RATE, repeat: float = 0.0) -> CameraFailures:
-    """The camera that fails in one way only, by the name of that."""
+    """Make the camera with one kind of failure, a key of `PRESETS`."""
     return CameraFailures(noise_level, (PRESETS[name]._replace(rate=rate),), repeat)

@@ -1,6 +1,6 @@
-"""Noise with the tails, outliers and misses that were fitted to a pose estimator.
+"""Noise with tails, outliers and misses that were fitted to a pose estimator.
 
-It is drawn, or stated of an observation that a camera of this noise has made.
+It can be drawn, or its covariance can be stated for an existing observation (`restate`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,45 +19,47 @@ from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, f
 from apo_bench.perception.observation.models.tails import Split
 
 SMALLEST_SCALE = 1e-4
+"""Least scale of a tail, relative to the limit."""
 LEAST_FREEDOM = 0.5
-"""Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
+"""Least degrees of freedom of a tail."""
 LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
 _GAUSSIAN = 1e9
-"""Degrees of freedom of a Gaussian, as good as infinitely many."""
+"""Degrees of freedom that are stated for a Gaussian, in place of infinity."""
 _AS_MEASURED = NoiseLevel(1.0, 1.0)
 LARGEST_M = 0.4
+"""Largest standard deviation of a position per axis that a level may give."""
 LARGEST_RAD = 2.0
-"""A standard deviation per axis beyond which a level makes no sense."""
+"""Largest standard deviation of a rotation per axis that a level may give."""
 
 
 @final
 @dataclass(frozen=True)
 class MeasuredNoise:
-    """The noise of a pose estimator, as a file states it."""
+    """The measured noise of a pose estimator, as in a noise file."""
 
     source: str
-    """Which estimator on which data, and where the numbers are from."""
+    """The estimator, the data and the origin of the numbers."""
     shift_mm: Split
-    """Where parts are taken to be, those that are found."""
+    """Distribution of the position errors of inliers."""
     turn_deg: Split
-    """How parts are taken to be turned, those that are found and not turned by more than its limit."""
+    """Distribution of the rotation errors of inliers."""
     missed: float
-    """Part of all that nothing was found for."""
+    """Fraction of parts without an estimate."""
     outliers: float
-    """Part of those that were found, that are off by more than the limit of the shift."""
+    """Fraction of estimates that are off by more than the limit of the shift."""
     farthest_mm: float
-    """Outliers are off by the limit to this, equally often in each octave."""
+    """Largest distance of an outlier; distances are log-uniform from the limit of the shift to this."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class FittedNoise:
-    """Every pose is observed at `T exp(xi)`, xi of an error (x, y, along; rx, ry, about) in the frame of its ray.
+    """Noise drawn from a fitted distribution of errors (x, y, along; rx, ry, about) in the frame of the camera ray.
 
-    Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
-    changes which operations are outliers or missed, but at level 0 all is observed as shown. The covariance is that of
-    inliers; an observation does not know which of its poses are outliers, only how often there are any.
+    Level 1 is as measured: its mm are a factor on every shift and its degrees on every turn, also those of outliers.
+    The level does not change which operations are outliers or missed, but at level 0 all are observed exactly. The
+    stated covariance is that of inliers; an observation states how often outliers occur, not which ones they are.
     """
 
     measured: MeasuredNoise
@@ -84,7 +86,7 @@ class FittedNoise:
 
     @property
     def covariance(self) -> Array:
-        """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
+        """(6, 6), covariance of inliers at level 1 in the frame of the ray, [m, rad]."""
         across, along = self.measured.shift_mm.variances
         out, about = self.measured.turn_deg.variances
         return np.diag(np.array([across, across, along, out, out, about]) * LEVEL_UNITS**2)
@@ -120,7 +122,7 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
 
 
 def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
-    """The tails of inliers, in the frames of the rays on which parts are observed."""
+    """The tails that an observation states: those of inliers, in the frames of the rays to observed poses (n, 4, 4)."""
     shift = measured.shift_mm
     turn = measured.turn_deg
     units = np.repeat(LEVEL_UNITS[[0, 3]] * noise_level, 2)
@@ -135,7 +137,7 @@ def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camer
 
 
 def check_measured_level(noise_level: NoiseLevel, covariance: Array) -> None:
-    """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
+    """Raise an `InputError` if the standard deviation at this level exceeds `LARGEST_M` or `LARGEST_RAD`.
 
     Args:
         covariance: (6, 6), at level 1, [m, rad].
@@ -160,18 +162,18 @@ def observe_in_ray_frames(
     covariance: Array,
     missed: NDArray[np.bool_],
 ) -> Observation:
-    """What a camera reports that makes these errors.
+    """Make the observation of a camera with these errors.
 
     Args:
         errors: (n, 6), at level 1, in the frames of the rays: (x, y, along; rx, ry, about), [m, rad].
-        covariance: (6, 6), of inliers.
-        missed: (n,), what nothing is found for.
+        covariance: (6, 6), of inliers at level 1, in the frame of the ray.
+        missed: (n,), True for an operation that is not observed.
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)
     xi = camera.twists(demonstration.poses, errors * scale)
     stated = camera.covariance(displace(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
-    missed = missed & (max(noise_level) > 0.0)
+    missed = missed & (max(noise_level) > 0.0)  # at level 0 nothing is missed
     poses = seen.poses.copy()
     stated = seen.covariance.copy()
     poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
@@ -180,8 +182,8 @@ def observe_in_ray_frames(
 
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
-    """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
-    # Gaussian vectors have any direction equally often, Gaussian quaternions any rotation; log-uniform sizes.
+    """Draw errors (n, 6) of outliers, [mm, deg]: log-uniform distances, uniform directions, uniform rotations."""
+    # Normalised Gaussian vectors are uniform directions, normalised Gaussian quaternions uniform rotations.
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     size = measured.shift_mm.limit * (measured.farthest_mm / measured.shift_mm.limit) ** rng.random((n, 1))

@@ -1,4 +1,4 @@
-"""Noise that is the same in every direction: Gaussian, with a factor for each part, or with heavy tails."""
+"""Isotropic noise: Gaussian, Gaussian with a factor per part, or with heavy tails."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -11,12 +11,13 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 LEAST_FACTOR = 0.3
+"""Smallest factor of a part on the level."""
 MOST_FACTOR = 4.0
-"""Range of the factor of a part on the level."""
+"""Largest factor of a part on the level."""
 FREEDOM = 5.0
-"""Degrees of freedom: an excess kurtosis of 6, where public pose estimates on T-LESS have 5.6 along the ray."""
+"""Degrees of freedom: excess kurtosis 6; public pose estimates on T-LESS have 5.6 along the ray."""
 _FARTHEST = 1e6
-"""[m] and [rad]: no limit."""
+"""Stated limit of an error, [m] and [rad]; so large that there is none."""
 
 
 @final
@@ -24,8 +25,8 @@ _FARTHEST = 1e6
 class IsotropicNoise:
     """Every pose is observed at `T exp(xi)`, xi a Gaussian body twist of zero mean.
 
-    Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
-    exactly zero: the poses are then those that were shown, bit for bit.
+    The level only scales unit draws, so equal seeds give proportional errors at all levels. At level 0 the observed
+    poses are the demonstrated ones, bit for bit.
     """
 
     noise_level: NoiseLevel
@@ -47,10 +48,10 @@ class IsotropicNoise:
 @final
 @dataclass(frozen=True)
 class PerPartNoise:
-    """Isotropic noise with one factor per part on the level, in every operation that moves the part.
+    """Isotropic noise with one log-uniform factor per part, the same in every operation that moves the part.
 
-    Factors are log-uniform, and drawn after the unit draws of the twists: at all levels a part has the same factor,
-    and its errors are those of `isotropic` times that.
+    The factors are drawn after the unit draws of the twists. So a part has the same factor at all levels, and its
+    errors are those of `isotropic` times the factor.
     """
 
     noise_level: NoiseLevel
@@ -78,14 +79,14 @@ class PerPartNoise:
 @final
 @dataclass(frozen=True)
 class HeavyTailedNoise:
-    """Isotropic noise from a multivariate Student t in place of a Gaussian: position and turn are bad together.
+    """Isotropic noise from a multivariate Student t distribution: position and rotation have a common scale.
 
     It is scaled so that the level is the true standard deviation, which is finite above two degrees of freedom.
     """
 
     noise_level: NoiseLevel
     freedom: float = FREEDOM
-    """Above 2, below which there is no covariance."""
+    """Degrees of freedom, above 2, so that the covariance is finite."""
 
     FACTS: ClassVar[Facts] = Facts(
         title="Student t with one scale per operation: a few errors are very large",
@@ -103,7 +104,8 @@ class HeavyTailedNoise:
         return replace(seen, tails=self._tails(len(assembly))) if min(self.noise_level) > 0.0 else seen
 
     def _tails(self, n: int) -> Tails:
-        # A Student t of scale s has the variance s^2 nu / (nu - 2).
+        """The stated tails of n operations."""
+        # A Student t of scale s has the variance s^2 nu / (nu - 2). Indices: position across and along, then rotation.
         each = self.noise_level.sigma()[[0, 0, 3, 3]]
         return Tails(
             frames=np.tile(np.eye(3), (n, 1, 1)),
@@ -116,7 +118,7 @@ class HeavyTailedNoise:
 
 
 def part_factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str, float]:
-    """The factor of every part; one number of chance for each, in the order of their names."""
+    """Draw the factor of every part, one random number each, in alphabetical order of the parts."""
     names = sorted(parts)
     return dict(
         zip(names, np.exp(rng.uniform(np.log(LEAST_FACTOR), np.log(MOST_FACTOR), len(names))).tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""Noise with gross outliers and missed operations."""
+"""Isotropic noise with unmarked gross outliers and missed operations."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
@@ -12,27 +12,31 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OUTLIERS = 0.1
+"""Fraction of operations that are outliers."""
 MISSES = 0.02
-"""Share of operations that are observed quite wrongly, and that are not observed."""
+"""Fraction of operations that are not observed."""
 OUTLIER_TIMES = 10.0
-"""An outlier errs by so many times the level."""
+"""Factor on the error of an outlier."""
 UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
-"""Standard deviation that is stated of what was not observed, [m, rad]."""
+"""(6,), standard deviation that is stated for a missed operation, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True)
 class OutlierNoise:
-    """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
+    """Isotropic noise in which some errors are many times larger, unmarked, and some operations are missed.
 
-    The stated covariance is that of inliers. The same operations are outliers and missed at every level, but for level
-    0, at which everything is observed as shown.
+    The stated covariance is that of inliers. The same operations are outliers and missed at every level, except at
+    level 0, where all are observed exactly.
     """
 
     noise_level: NoiseLevel
     outliers: float = OUTLIERS
+    """Probability of an outlier."""
     misses: float = MISSES
+    """Probability of a miss."""
     times: float = OUTLIER_TIMES
+    """Factor on the error of an outlier."""
 
     FACTS: ClassVar[Facts] = Facts(
         title="gross outliers that are not marked, and missed operations",
@@ -70,7 +74,12 @@ class OutlierNoise:
 
 
 def find_last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
-    """The last observed pose of the part of each operation, or its start, (n, 4, 4)."""
+    """The last observed pose of the main part of each operation, or its start pose, (n, 4, 4).
+
+    Args:
+        poses: (n, 4, 4), observed poses.
+        seen: (n,), True for an operation that was observed.
+    """
     now = dict(start)
     out = poses.copy()
     for k, operation in enumerate(assembly.operations):

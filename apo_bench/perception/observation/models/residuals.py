@@ -1,4 +1,4 @@
-"""Residuals of a pose estimator in the frames of the rays of its camera."""
+"""Residuals of a pose estimator: match its estimates to the truth, and express errors in the frames of camera rays."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,48 +14,51 @@ from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 
 INLIER_MM = 50.0
-"""An estimate that is farther off than this is of something else."""
+"""An estimate with a larger position error is an outlier."""
 TURNED_DEG = 30.0
-"""An estimate that is turned more than this is of a part that looks the same when turned, or is upside down;
-which of the two, only the symmetries of the models would show."""
+"""An estimate with a larger rotation error is turned: the part is symmetric, or the estimate is wrong. Only the
+symmetries of the models could tell which."""
 _GAP_DEG = 55.0
+"""Symmetries of 60 degrees or more leave few rotation errors between `TURNED_DEG` and this angle."""
 _IN_GAP = 1.0 / 30.0
-"""Where a part looks the same only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
-than this part of all, where 14 % are if any turn about an axis is as likely."""
+"""An object is round if a larger fraction of its estimates lies in that gap; it is 14 % for uniform angles."""
 _FEWEST_ALIKE = 5
+"""At least so many gross estimates of an object have to agree on a fixed point."""
 _ALIKE = 0.1
-"""So many gross estimates of an object, and so large a part of those found, have to agree on a point."""
+"""At least this fraction of the estimates of an object has to agree on it."""
 _NEAR = 4.0
-"""They agree within so many times the median error of estimates that are upright."""
+"""They agree within so many times the median position error of upright estimates."""
 _MOST_POINTS = 500
-"""Points of so many estimates are tried."""
+"""Number of estimates whose fixed points are tried, at most."""
 MOST_PAIRS = 10_000_000
+"""Pairs of estimates and true parts of one object in one image, at most."""
 _MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """One row for every part that was there; what nothing was found for is NaN."""
+    """The errors of the estimates, one row per part in the truth; NaN for a part without an estimate."""
 
     where: NDArray[np.int64]
     """(n, 3): scene, image, object."""
     shift_mm: Array
-    """(n, 3), from the true to the estimated place: x, y, along the ray; of one that is `beside`, of that point."""
+    """(n, 3), from the true to the estimated position: x, y, along the ray; see `beside` for the reference point."""
     turn_deg: Array
     """(n, 3), rotation vector from the true to the estimated rotation: about x, about y, about the ray."""
     trace_deg: Array
-    """(n,), the angle that the trace of the two matrices says as they are written."""
+    """(n,), rotation angle from the trace of the matrices as written in the files."""
     score: Array
-    """(n,), of the estimate."""
+    """(n,), confidence of the estimate."""
     surplus: int = 0
-    """Estimates, in images of the truth, that were left when every part had one."""
+    """Number of estimates in images of the truth that no part was matched to."""
     absent: int = 0
-    """Those of them whose object is not in the image at all."""
+    """Number of surplus estimates whose object is not in the image."""
     distance_mm: float = float("nan")
     """Median distance from the camera."""
     beside: int = 0
-    """Estimates that are turned about a point of the part 25 mm and more from its origin, and else right."""
+    """Number of gross estimates that only turn a part about a fixed point off its origin; their shift is that of this
+    point."""
 
     @cached_property
     def found(self) -> NDArray[np.bool_]:
@@ -67,14 +70,14 @@ class Residuals:
 
     @cached_property
     def upright(self) -> NDArray[np.bool_]:
-        """Inliers that are not turned, whose shift is known: the axis of a symmetry may lie off the origin of a part,
-        so that even the shift of one that is turned says nothing."""
+        """(n,), inliers that are not turned. Turned ones are left out, since a symmetry axis off the origin of a part
+        makes their shift meaningless."""
         return self.inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
 
     @cached_property
     def round_objects(self) -> tuple[int, ...]:
-        """Objects that seem to look the same turned by any angle about an axis: fewer than half of their inliers are
-        upright, and turns are everywhere."""
+        """Objects that seem to be rotationally symmetric: fewer than half of their inliers are upright, and rotation
+        errors of all sizes occur."""
         parts = list[int]()
         for part in np.unique(self.where[self.inlier, 2]).tolist():
             angle = self.angle_deg[self.inlier & (self.where[:, 2] == part)]
@@ -85,7 +88,7 @@ class Residuals:
 
     @cached_property
     def turn_known(self) -> NDArray[np.bool_]:
-        """Upright ones of objects that are not round."""
+        """(n,), upright estimates of objects that are not round, so that their rotation error is known."""
         return self.upright & ~np.isin(self.where[:, 2], self.round_objects)
 
     @cached_property
@@ -106,11 +109,11 @@ class Residuals:
 
 
 def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
-    """Match estimates to the truth and say how far off they are; those of images without truth do not count.
+    """Match estimates to the truth and compute their errors; estimates in images without truth are ignored.
 
-    Per image and object, every part that was there gets its own estimate so that the distances add up to the
-    least (the Hungarian method), however far off: `INLIER_MM` marks what is gross afterwards. Scores do not count.
-    Rotations are the nearest ones to the matrices as written.
+    Per image and object, parts and estimates are assigned with the least sum of distances (Hungarian method), without
+    a limit of distance and regardless of scores. `INLIER_MM` marks outliers afterwards. Matrices in the files are
+    replaced by the nearest rotations.
     """
     from scipy.spatial.transform import Rotation
 
@@ -151,19 +154,20 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
 def _about_fixed_points(
     objects: NDArray[np.int64], moved: Array, R: Array, R_obs: Array
 ) -> tuple[NDArray[np.bool_], Array]:
-    """Which gross estimates only turn a part about a point that is fixed in it, and all shifts, of theirs that point.
+    """Find gross estimates that only turn a part about a fixed point, and compute their shifts at that point.
 
-    A part that looks the same when turned about an axis off its origin is observed with its origin far off, though it
-    stands where it is. Every symmetry keeps a point c, so the turned estimates of one object agree on it: (R - I) c + t
-    is as small as the errors of those that are upright.
+    A symmetry about an axis off the origin displaces the estimated origin although the shape is where it was. Every
+    symmetry keeps a point c, so the turned estimates of one object agree on it: (R - I) c + t is as small as the errors
+    of upright estimates.
 
     Args:
-        objects: (n,), of each estimate.
-        moved: (n, 3), from the true to the estimated origin, camera axes, mm.
-        R: (n, 3, 3), true rotations; R_obs are the estimated ones.
+        objects: (n,), object of each estimate.
+        moved: (n, 3), from the true to the estimated origin, camera axes, [mm].
+        R: (n, 3, 3), true rotations.
+        R_obs: (n, 3, 3), estimated rotations.
 
     Returns:
-        (n,) and (n, 3), mm.
+        Mask (n,) of these estimates; and shifts (n, 3), [mm], those of the others unchanged.
     """
     off = np.linalg.norm(moved, axis=1)
     D = np.swapaxes(R, 1, 2) @ R_obs - np.eye(3)
@@ -194,19 +198,24 @@ def _about_fixed_points(
 
 
 def _point_off(D: Array, t: Array, c: Array) -> Array:
-    """How far a point c of a part is moved, (n,), by rotations less the identity (n, 3, 3) and shifts (n, 3)."""
+    """The distance (n,) by which displacements move a point c (3,) of a part.
+
+    Args:
+        D: (n, 3, 3), rotations less the identity.
+        t: (n, 3), shifts.
+    """
     return np.asarray(np.linalg.norm(D @ c + t, axis=1))
 
 
 def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
-    """Whether each row stands among those that are known, (n,)."""
+    """(n,), True for each row that also occurs in `known`."""
     _, key = np.unique(np.concatenate([known, rows]), axis=0, return_inverse=True)
     key = key.reshape(-1)
     return np.isin(key[len(known) :], key[: len(known)])
 
 
 def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
-    """The row of the estimates that belongs to each row of the truth, or -1, (n,)."""
+    """The index (n,) of the estimate matched to each row of the truth, -1 if there is none."""
     from scipy.optimize import linear_sum_assignment
 
     partner = np.full(len(truth.where), -1, dtype=np.int64)
@@ -219,14 +228,14 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
 
 
 def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
-    """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
+    """Yield the row indices of truth and estimates for each image and object that both contain."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
     there, seen = (_rows_by_key(keys) for keys in np.split(key.reshape(-1), [len(truth)]))
     yield from ((there[each], seen[each]) for each in sorted(there.keys() & seen.keys()))
 
 
 def _rows_by_key(keys: Any) -> dict[int, Any]:
-    """Key -> the rows that have it, in their order."""
+    """Key -> indices of the rows with this key, ascending."""
     order = np.argsort(keys, kind="stable")
     each, first = np.unique(keys[order], return_index=True)
     return dict(zip(each.tolist(), np.split(order, first[1:]), strict=True)) if len(keys) else {}

@@ -1,4 +1,4 @@
-"""Noise with errors that operations share: of a part model, of the camera pose, or of drift."""
+"""Noise with errors that several operations share: a bias of a part model, of the camera pose, or drift."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, final
@@ -12,19 +12,19 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OWN = 1.0 / 20.0
-"""What operations that share an error err by themselves, as part of the level."""
+"""Standard deviation of the independent error of each operation, relative to the level."""
 OWN_FACT = f"o = {OWN:g}: independent error of each operation over the level"
 CORRELATION = 0.9
-"""Between the errors of an operation and the next."""
+"""Correlation between the errors of consecutive operations."""
 
 
 @final
 @dataclass(frozen=True)
 class BiasNoise:
-    """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
+    """Noise with one constant error (body twist) per part, drawn per trial, in every operation that moves the part.
 
-    Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
-    operations for independent ones assume too much.
+    Its mean is zero over seeds, but not over the operations of a trial. A correction that assumes independent errors
+    of a part in two operations is overconfident.
     """
 
     noise_level: NoiseLevel
@@ -55,13 +55,13 @@ class BiasNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class ViewBiasNoise:
-    """One displacement E of the world, drawn per trial, takes every part to where it is observed, but for a small part.
+    """Noise with one common displacement of all poses, drawn per trial, plus a small independent error.
 
-    Poses of parts relative to each other are nearly exact, those relative to the fixed parts are not. E turns about
-    the middle of the operations' poses, where its size is the level; about the camera, a degree would be 16 mm.
-    The twist by which an operation is wrong, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same
-    computed from shown poses and from observed ones. What is stated is about the middle of the observed poses, so that
-    nothing of the truth is in it; seen from there, e has the same distribution.
+    Poses of moved parts relative to each other are nearly exact, those relative to fixed parts are not. The rotation
+    is about the middle of the operations' poses, where the size is the level; about the camera, a degree would be
+    16 mm. The error of an operation, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same computed
+    from demonstrated and from observed poses. The stated covariance is about the middle of the observed poses, so it
+    contains nothing of the truth; e has the same distribution there.
     """
 
     noise_level: NoiseLevel
@@ -95,8 +95,8 @@ class ViewBiasNoise:
 class CorrelatedNoise:
     """Isotropic Gaussian noise whose errors follow a first-order autoregression from operation to operation.
 
-    It drifts in the axes of the camera, whatever part is moved, as with a mount that warms up. After any number of
-    operations its standard deviation is the level.
+    The errors drift in the axes of the camera, regardless of the part, as with a mount that warms up. Their standard
+    deviation is the level in every operation.
     """
 
     noise_level: NoiseLevel
@@ -116,7 +116,7 @@ class CorrelatedNoise:
         unit, own = rng.standard_normal((2, len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]
-        # From the axes of the camera into those of the part: the turn by R^t, the shift by the observed R^t.
+        # From the axes of the camera into those of the part: the rotation by R^t, the shift by the observed R^t.
         in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
         xi = np.zeros((len(assembly), 6))
         xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], in_world[:, 1])

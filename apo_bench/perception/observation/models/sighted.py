@@ -1,4 +1,4 @@
-"""Noise of a camera that is worse along its line of sight."""
+"""Noise of a camera whose position errors are larger along its line of sight."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, final
@@ -18,24 +18,26 @@ from apo_bench.perception.observation.models.displacement import displace, obser
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 ALONG_SIGHT = 3.0
+"""Factor on the level: position along the line of sight."""
 ACROSS_SIGHT = 0.5
-"""Standard deviation of a position over the level, along the line of sight and across it."""
+"""Factor on the level: position across the line of sight."""
 OUT_OF_IMAGE = 2.0**0.5
+"""Factor on the level: rotation about axes in the image plane."""
 IN_IMAGE = 0.5
-"""Standard deviation of a turn over the level: about axes of the image plane, and about the line of sight."""
+"""Factor on the level: rotation about the line of sight."""
 
 
 @final
 @dataclass(frozen=True)
 class AnisotropicNoise:
-    """Every pose is observed at `T exp(xi)`; in the world xi is Gaussian with axes along and across the sight.
+    """Gaussian noise with principal axes along and across one line of sight, which is fixed in the world.
 
-    A camera finds depth less well than the place in the image, and a turn that tilts a part out of the image less
-    well than one within it. The geometric means of the factors, 0.91 for positions and 1 for turns, keep a level
-    comparable with that of `isotropic`; the root mean square of a position is 1.8 times as large.
+    A camera measures depth less well than the position in the image, and tilts out of the image less well than
+    rotations in it. The geometric means of the factors are 0.91 for positions and 1 for rotations, comparable with
+    `isotropic`; the root mean square of a position is 1.8 times as large.
 
-    The body covariance is R^t S R with S fixed in the world and R the rotation that was observed. That is exact: a turn
-    leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is observed.
+    The covariance in the body frame is R^t S R, with S fixed in the world and R the observed rotation. It is exact: a
+    rotation keeps its own axis, so it is drawn first, and the position is drawn in the observed frame.
     """
 
     noise_level: NoiseLevel
@@ -57,7 +59,7 @@ class AnisotropicNoise:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the observed frame, R_obs^t S1 e.
+        # First the rotation, w = R^t S2 e'; then the shift in the observed frame, R_obs^t S1 e.
         sight = line_of_sight()
         unit = rng.standard_normal((len(assembly), 6))
         place = self.noise_level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
@@ -75,18 +77,22 @@ class AnisotropicNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class CameraNoise:
-    """Every part errs about its own ray: along it, across it, about it, and by tilting towards it.
+    """Gaussian noise with principal axes along and across the camera ray to each part.
 
-    The factors on the level are those of `anisotropic`, which is this seen from infinitely far away: there all rays are
-    parallel, while those of a camera 0.9 m away to parts half a metre apart differ by some 30 degrees.
+    The factors on the level are those of `anisotropic`, whose rays are parallel as for a camera at infinity. Rays of a
+    camera 0.9 m away to parts half a metre apart differ by some 30 degrees.
     """
 
     noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
     across: float = ACROSS_SIGHT
+    """Factor on the level: position across the ray, per axis."""
     along: float = ALONG_SIGHT
+    """Factor on the level: position along the ray."""
     tilt: float = OUT_OF_IMAGE
+    """Factor on the level: rotation about axes across the ray, per axis."""
     about: float = IN_IMAGE
+    """Factor on the level: rotation about the ray."""
 
     FACTS: ClassVar[Facts] = Facts(
         title="a camera at a place: errors along, across and about the ray to each part",
@@ -119,16 +125,16 @@ class CameraNoise:
 
 
 def line_of_sight() -> Array:
-    """The direction in which the camera looks, world frame, (3,), of length 1: obliquely down."""
+    """Unit vector (3,), world frame, of the optical axis of the default camera, obliquely down."""
     return Camera().T_world_camera[:3, 2]
 
 
 def _stretch(axis: Array, along: float, across: float) -> Array:
-    """The symmetric matrix (3, 3) that stretches by these factors along an axis and across it."""
+    """The symmetric matrix (3, 3) that scales by these factors along a unit vector and across it."""
     return across * np.eye(3) + (along - across) * np.outer(axis, axis)
 
 
 def _in_body(R: Array, S: Array) -> Array:
-    """R^t S R of every part, (n, 3, 3), symmetric to the last bit."""
+    """R^t S R for rotations (n, 3, 3) and one matrix (3, 3); made exactly symmetric."""
     turned = np.einsum("nji,jk,nkl->nil", R, S, R)
     return np.asarray((turned + np.swapaxes(turned, 1, 2)) / 2)

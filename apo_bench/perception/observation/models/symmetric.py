@@ -1,4 +1,4 @@
-"""Noise of parts that look the same when turned."""
+"""Noise of symmetric parts: rotations about their symmetry axes are less certain."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
@@ -21,21 +21,21 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 WORSE = 3.0
+"""Factor on the level for rotations about an axis with high symmetry."""
 _MANY = 3.0
-"""Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""
+"""An axis has high symmetry if a part looks the same at least this often in a full turn."""
 
 
 @final
 @dataclass(frozen=True)
 class SymmetricNoise:
-    """Isotropic noise about the centre of volume, larger for turns that hardly change how a part looks.
+    """Isotropic noise about the centre of volume, with larger rotations about axes of symmetry.
 
     About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
-    edges tell how far it is turned: there the standard deviation is `WORSE` times the level.
+    edges show its rotation. There the standard deviation is `WORSE` times the level.
 
-    Of the poses at which a part looks the same, the one nearest to the truth is reported: contacts name faces, they are
-    taken as certain, and they say which of the equal sides is which. A turn is thus wrong by half the angle between
-    two equal poses at most, whatever the level.
+    Of the equivalent poses of a symmetric part, the one nearest to the truth is reported, since contacts name faces and
+    so distinguish equal sides. A rotation error is thus at most half the angle between two equivalent poses.
     """
 
     noise_level: NoiseLevel
@@ -80,16 +80,26 @@ class SymmetricNoise:
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
-        """The standard deviations drawn and those stated, (6,) each, about the centre of volume, [m, rad]."""
+        """Standard deviations that are drawn, and those that are stated, (6,) each, [m, rad].
+
+        Both are about the centre of volume; `fold` (3,) is the order of symmetry about each axis.
+        """
         turn = np.radians(self.noise_level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
         place = np.full(3, self.noise_level.mm * 1e-3)
+        # Reported rotations are at most pi / fold; a uniform distribution over that range has this deviation.
         apart = np.where(np.isinf(fold), np.inf, np.pi / fold / np.sqrt(3.0))
         return np.append(place, turn), np.append(place, np.minimum(turn, apart))
 
 
 def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
-    """The centre of volume with the axes of a solid, or with an axis of revolution as z, (4, 4); and how often it looks
-    the same in a whole turn about each, (3,).
+    """The principal frame of a solid, and the order of its symmetry about each axis of that frame.
+
+    Args:
+        group: (m, 4, 4), symmetries of the solid.
+
+    Returns:
+        (4, 4), origin at the centre of volume, z along an axis of revolution if there is one, [m]; and (3,), how often
+        the solid looks the same in a full turn, infinite about an axis of revolution.
     """
     frame = pose.at(solid.centroid)
     body = find_revolution(solid)
@@ -104,9 +114,9 @@ def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
 @final
 @dataclass(frozen=True)
 class AnyTurnNoise:
-    """Noise of `symmetric` that reports any of the poses that look the same, each as likely, whatever the level.
+    """Noise as `symmetric` that reports one of the equivalent poses of a part at random, also at level 0.
 
-    The covariance is that about the pose of the same look which is nearest to what is reported.
+    The covariance is that of the error from the equivalent true pose nearest to the reported one.
     """
 
     noise_level: NoiseLevel
@@ -120,6 +130,7 @@ class AnyTurnNoise:
 
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:
+        """Draw one symmetry (4, 4) of a solid; about an axis of revolution by a uniform angle."""
         group = find_symmetries(solid)
         body = find_revolution(solid)
         turn = np.asarray(group[rng.integers(len(group))])

@@ -1,9 +1,9 @@
-"""The distribution of errors across a ray and along it: independent Student t, within a limit.
+"""The distribution of errors across and along a camera ray: independent Student t, truncated at a limit.
 
-Across there are two equal directions, along there is one. The same form serves for shifts [mm] and for turns [deg]
-(about axes across the ray, and about the ray). All integrals over the limited region are taken along the ray, by Gauss
-and Legendre in y with x = s sinh(y), which is dense where the density is high, however long its tail; across, they have
-a closed form.
+Across the ray there are two equal directions, along it one. The same form serves for shifts [mm] and for rotations
+[deg] (about axes across the ray, and about the ray). Integrals over the truncated region use Gauss-Legendre quadrature
+along the ray, in y with x = s sinh(y), whose nodes are dense where the density is high. Across the ray they have a
+closed form.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,18 @@ from numpy.typing import ArrayLike
 from apo_bench.geometry import Array
 
 _NODES = 160
+"""Nodes of the quadrature along the ray."""
 _GAUSS = 200.0
-"""Student t with more degrees of freedom counts as Gaussian, infinitely many."""
+"""A Student t with more degrees of freedom is taken as Gaussian."""
 _X, _W = np.polynomial.legendre.leggauss(_NODES)
 
 
 class Tail(NamedTuple):
-    """Student t about zero: its scale, and its degrees of freedom, infinite for a Gaussian."""
+    """A Student t distribution about zero."""
 
     scale: float
     freedom: float = float("inf")
+    """Degrees of freedom; infinite for a Gaussian."""
 
     @property
     def heaviness(self) -> float:
@@ -36,16 +38,20 @@ class Tail(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Split:
-    """The distribution of errors (x, y, along)."""
+    """The distribution of error vectors (x, y, along), truncated at a length."""
 
     across: Tail
+    """Of (x, y), with a common scale factor of both."""
     along: Tail
     limit: float
-    """No error is longer."""
+    """Largest length of an error vector."""
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
-        """Places along the ray and what each stands for: density times weight, before the limit across."""
+        """Quadrature nodes along the ray (nodes,), and weights times density along the ray, (nodes,).
+
+        The truncation across the ray is not included.
+        """
         s = self.along.scale
         top = np.arcsinh(self.limit / self.along.scale)
         y = top * _X
@@ -54,36 +60,39 @@ class Split:
 
     @cached_property
     def inside(self) -> float:
-        """The part of the unlimited distribution that is within the limit."""
+        """The probability of the untruncated distribution within the limit."""
         x, w = self._nodes
         return float(w @ _below_across(self.across, self._left(x, self.limit)))
 
     @cached_property
     def variances(self) -> tuple[float, float]:
-        """The variance in one direction across and in the one along, within the limit."""
+        """The variances of the truncated distribution: in one direction across, and along."""
         x, w = self._nodes
         left = self._left(x, self.limit)
         across = float(w @ _square_below(self.across, left)) / self.inside / 2.0
         return across, float(w @ (x * x * _below_across(self.across, left))) / self.inside
 
     def cdf_across(self, r: ArrayLike) -> Array:
-        """The cumulative distribution of the length of the error across."""
+        """The cumulative distribution of the length of the error across, at lengths r of any shape."""
         r = np.asarray(r, dtype=np.float64)
         x, w = self._nodes
         return _below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
 
     def cdf_along(self, a: ArrayLike) -> Array:
-        """The cumulative distribution of the size of the error along."""
+        """The cumulative distribution of the absolute error along, at sizes a of any shape."""
         x, w, _ = self._nodes_to(a)
         return np.sum(w * _below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
 
     def cdf_length(self, r: ArrayLike) -> Array:
-        """The cumulative distribution of the length of the whole error."""
+        """The cumulative distribution of the length of the error vector, at lengths r of any shape."""
         x, w, end = self._nodes_to(r)
         return np.sum(w * _below_across(self.across, self._left(x, end)), axis=-1) / self.inside
 
     def _nodes_to(self, end: ArrayLike) -> tuple[Array, Array, Array]:
-        """As `_nodes`, from -end to end, (*, nodes) each, and the ends within the limit, (*, 1)."""
+        """Nodes and weights as `_nodes`, for integrals from -end to end, (*, nodes) each.
+
+        The third value is `end` clipped to the limit, (*, 1).
+        """
         end = np.minimum(np.asarray(end, dtype=np.float64), self.limit)[..., None]
         # x = s sinh(y), so dx = s cosh(y) dy = hypot(s, x) dy, and y runs to asinh(end / s).
         top = np.arcsinh(end / self.along.scale)
@@ -91,7 +100,7 @@ class Split:
         return x, top * _W * np.hypot(self.along.scale, x) * np.exp(compute_log_density_along(self.along, x)), end
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
-        """Errors (n, 3); what falls outside the limit is drawn again."""
+        """Draw errors (n, 3): x, y, along; errors beyond the limit are drawn again."""
         kept = np.zeros((0, 3))
         while len(kept) < n:
             # Student t is a Gaussian over sqrt(chi-square(n) / n): one divisor for both directions across, one along.
@@ -103,18 +112,22 @@ class Split:
 
     @staticmethod
     def _left(x: Array, limit: ArrayLike) -> Array:
-        """How much is left across at a place along."""
+        """The largest length across at positions x along the ray, for vectors up to the limit."""
         return np.sqrt(np.maximum(np.asarray(limit) ** 2 - x * x, 0.0))
 
 
 def unpack_tails(at: Array, limit: float) -> Split:
-    """From four numbers to fit: logarithm of the scale and inverse of the degrees of freedom, across, then along."""
+    """Make a distribution from the parameters of a fit.
+
+    Args:
+        at: (4,), logarithm of the scale and inverse of the degrees of freedom, across, then along.
+    """
     tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / _GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
     return Split(tails[0], tails[1], limit)
 
 
 def compute_log_density_along(tail: Tail, x: Array) -> Array:
-    """The logarithm of the density of Student t in one direction."""
+    """The log density of a one-dimensional Student t at x."""
     from scipy.special import gammaln
 
     h = tail.heaviness
@@ -127,7 +140,7 @@ def compute_log_density_along(tail: Tail, x: Array) -> Array:
 
 
 def compute_log_density_across(tail: Tail, r: Array) -> Array:
-    """The logarithm of the density, per area, of Student t in two directions, at a distance r."""
+    """The log density, per area, of a two-dimensional Student t at a distance r from its centre."""
     h = tail.heaviness
     u = (r / tail.scale) ** 2
     falls = u / 2.0 if h == 0.0 else (0.5 / h + 1.0) * np.log1p(h * u)
@@ -135,7 +148,7 @@ def compute_log_density_across(tail: Tail, r: Array) -> Array:
 
 
 def _below_across(tail: Tail, r: Array) -> Array:
-    """The chance that Student t in two directions is nearer than r."""
+    """The probability that a two-dimensional Student t is nearer to its centre than r."""
     # 1 - (1 + r^2 / (n s^2))^(-n / 2); of a Gaussian 1 - exp(-r^2 / 2 s^2).
     h = tail.heaviness
     u = (r / tail.scale) ** 2
@@ -143,7 +156,10 @@ def _below_across(tail: Tail, r: Array) -> Array:
 
 
 def _square_below(tail: Tail, r: Array) -> Array:
-    """Integral of the squared distance times the density up to r: that of 2 r (1 - F) less r^2 (1 - F)."""
+    """The integral of squared distance times density of a two-dimensional Student t, up to distance r.
+
+    By parts it is the integral of 2 r (1 - F), less r^2 (1 - F), with F as in `_below_across`.
+    """
     h = tail.heaviness
     u = (r / tail.scale) ** 2
     s2 = tail.scale**2
@@ -158,5 +174,5 @@ def _square_below(tail: Tail, r: Array) -> Array:
 
 
 def _root_chi(tail: Tail, n: int, rng: np.random.Generator) -> Array:
-    """What a Gaussian is divided by to make it Student t, (n,)."""
+    """Draw the divisors (n,) that turn a Gaussian into a Student t: sqrt(chi-square / degrees of freedom)."""
     return np.sqrt(rng.chisquare(tail.freedom, n) / tail.freedom) if tail.heaviness > 0.0 else np.ones(n)

@@ -1,4 +1,4 @@
-"""Parts from outlines, bores and shafts; lengths in mm."""
+"""Build parts from outlines, bores and shafts, and write them as part files; lengths in mm."""
 
 from apo_bench.scenario.parts.making.body import Body, join
 from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude

@@ -1,4 +1,4 @@
-"""Bodies: convex pieces, faces and exact moments, in [m]."""
+"""A body under construction: its convex pieces, faces and exact moments, in [m]; bodies can be moved and joined."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -21,29 +21,34 @@ from apo_bench.geometry import (
 from apo_bench.scenario.parts.making.moments import Moments, sum_moments
 
 _SAME_M = 1e-9
+"""Lengths that differ by less are equal."""
 _PARALLEL = 1e-12
+"""Unit vectors are parallel if their absolute cosine is this near to 1."""
 _NARROW_M = 6e-6
-"""What is narrower is between two polygons of one circle."""
+"""Narrower areas are slivers between two polygons of one circle, and are dropped."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A solid that is being built."""
+    """A solid under construction."""
 
     pieces: tuple[Hull, ...]
+    """Convex pieces, without names."""
     flats: tuple[Face, ...]
-    """Those without a name are called ""."""
+    """Flat faces; "" is the name of a face without one."""
     rounds: tuple[RoundFace, ...]
+    """Round faces."""
     moments: Moments
+    """Exact moments, [m]."""
 
     def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> "Body":
-        """Turned about x, then y, then z of the frame, in degrees, then shifted."""
+        """The body rotated about the fixed axes x, then y, then z of its frame, then shifted."""
         from scipy.spatial.transform import Rotation
 
         R = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
         t = 1e-3 * np.asarray(at_mm)
-        R = np.where(np.abs(R) < 1e-15, 0.0, R)
+        R = np.where(np.abs(R) < 1e-15, 0.0, R)  # right angles stay exact
         return Body(
             tuple(_moved_piece(piece, R, t) for piece in self.pieces),
             tuple(
@@ -65,11 +70,12 @@ class Body:
         radius_mm: float,
         hole: bool = True,
     ) -> "Body":
-        """With the circle at the end of a hole, or of a shaft, as a separate face.
+        """The body with one more face: the circle (rim) at the end of a hole or a shaft.
 
         Args:
-            at_mm: Its middle.
-            axis: Out of the part.
+            at_mm: Centre of the circle, (3,).
+            axis: Direction out of the part, (3,), of any length.
+            hole: True for the rim of a hole, False for that of a shaft.
         """
         n = np.asarray(axis, dtype=np.float64)
         r = 1e-3 * radius_mm
@@ -77,7 +83,7 @@ class Body:
         return replace(self, rounds=(*self.rounds, rim))
 
     def prefixed(self, prefix: str) -> "Body":
-        """The same with names that begin so; faces without a name stay without."""
+        """The body with a prefix on the names of its faces; faces without a name get none."""
         return replace(
             self,
             flats=tuple(replace(f, name=f.name and prefix + f.name) for f in self.flats),
@@ -86,7 +92,10 @@ class Body:
 
 
 def join(*bodies: Body) -> Body:
-    """Bodies that touch and do not overlap, as one: faces end where others lie on them, and go on around them."""
+    """Join bodies that touch but do not overlap into one.
+
+    Where faces of two bodies lie on each other, the common area is removed; faces of one name in one plane are merged.
+    """
     flats = [face for body in bodies for face in body.flats]
     rounds = [face for body in bodies for face in body.rounds]
     return Body(
@@ -98,6 +107,7 @@ def join(*bodies: Body) -> Body:
 
 
 def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
+    """The piece after x -> R x + t."""
     cylinder = piece.cylinder
     if cylinder is not None:
         cylinder = cylinder._replace(center=R @ cylinder.center + t, axis=R @ cylinder.axis)
@@ -105,7 +115,10 @@ def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
 
 
 def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
-    """Faces by plane: what looks one way less what looks the other way, and neighbours of one name as one."""
+    """Join flat faces plane by plane.
+
+    In each plane the areas of opposite faces are subtracted from each other, and faces of one name and fit are merged.
+    """
     left = list(flats)
     while left:
         n = left[0].normal
@@ -131,14 +144,14 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
 
 
 def _apart(area: Any) -> Iterable[Any]:
-    """Polygons; what hangs together in a point alone is apart, since no file has the point twice."""
+    """Yield the polygons of an area, split where parts touch in a single point, which no ring may contain twice."""
     for polygon in list_polygons(area):
         parts = [*list_polygons(shapely.set_precision(polygon, _SAME_M))]
         yield from parts if len(parts) > 1 else [polygon]
 
 
 def _plane(n: Array) -> Array:
-    """Two directions across a normal, and it, as rows, (3, 3)."""
+    """A rotation (3, 3) whose rows are two unit vectors in the plane with normal n, and n."""
     u = np.eye(3)[(int(np.abs(n).argmax()) + 1) % 3]
     u = u - (u @ n) * n
     u /= np.linalg.norm(u)
@@ -146,13 +159,20 @@ def _plane(n: Array) -> Array:
 
 
 def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
+    """The face of a polygon in a plane.
+
+    Args:
+        to_plane: (3, 3), as from `_plane`.
+        d: Distance of the plane from the origin along its normal.
+        sign: 1 if the face looks along the normal, -1 if against it.
+    """
     flat = [straighten(ring) for ring in list_rings(polygon, sign)]
     outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
     return Face(name, outline, tuple(holes), fit)
 
 
 def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
-    """Walls of one radius, one name and one axis that follow each other, as one."""
+    """Merge cylindrical walls of equal radius, name and axis that follow each other."""
     joined: list[RoundFace] = []
     for face in rounds:
         for i, other in enumerate(joined):
@@ -166,6 +186,7 @@ def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
 
 
 def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
+    """Two consecutive walls as one; None if they are not parts of one cylinder or leave a gap."""
     if a.kind != "cylinder" or b.kind != "cylinder" or (a.hole, a.name, a.fit) != (b.hole, b.name, b.fit):
         return None
     off = b.point - a.point
@@ -180,6 +201,7 @@ def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
     )
     if not same:
         return None
+    # The span of b, in heights along the axis of a.
     spans = sorted([a.span, tuple(sorted(along + np.sign(turned) * np.array(b.span)))])
     if abs(spans[0][1] - spans[1][0]) > _SAME_M:
         return None
@@ -187,4 +209,5 @@ def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
 
 
 def _toward(face: RoundFace) -> Array:
+    """The direction to the middle of a partial wall, (3,); zero for a full turn."""
     return np.zeros(3) if face.toward is None else face.toward

@@ -1,4 +1,4 @@
-"""Cut flat areas into convex ones."""
+"""Decompose flat areas into convex ones: cells around bores, wedges of these, bands behind receding sides; in mm."""
 
 from typing import Any
 
@@ -9,25 +9,30 @@ from shapely import Point, Polygon, box, unary_union
 from apo_bench.geometry import Array, list_polygons, list_rings, straighten
 
 _SAME_MM = 1e-6
+"""Tolerance of lengths."""
 _ON_MM = 1e-9
+"""A corner this near to a clipping line lies on it."""
 _SLIVER_MM2 = 1e-9
+"""Smaller areas are dropped."""
 _WIDTHS_MM = (3.0, 2.0, 1.0, 0.6, 0.4)
-"""The first one that there is room for."""
+"""Widths of bands behind receding sides; the first that fits is taken."""
 _SAME = 1e-9
+"""Relative tolerance of areas and directions."""
 _REACHES = (2.0, 1.6, 1.35, 1.2, 1.1, 1.05, 1.02)
-"""How far the cell of a bore reaches, in radii; the first one that there is room for."""
+"""Half sides of the square cell around a bore, in radii of the bore; the first that fits is taken."""
 
 
 def cut_convex(area: Any) -> list[Array]:
-    """The convex areas, (k, 2) each, counter-clockwise, that a shapely area is cut into.
+    """Cut a shapely area into convex rings, (k, 2) each, counter-clockwise.
 
-    Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
-    there are at most four times as many as need be.
+    Triangles are joined across common sides while the result stays convex (Hertel and Mehlhorn), which gives at most
+    four times the least number of rings.
     """
     return [cell for polygon in list_polygons(area) if polygon.area > _SLIVER_MM2 for cell in _cut(polygon)]
 
 
 def _cut(polygon: Any) -> list[Array]:
+    """Cut one polygon, possibly with holes, into convex rings; the longest diagonals are removed first."""
     from manifold3d import triangulate
 
     rings = [straighten(ring) for ring in list_rings(polygon, 1.0)]
@@ -50,21 +55,21 @@ def _cut(polygon: Any) -> list[Array]:
 
 
 def _is_wide(ring: Array) -> bool:
-    """Whether an area is more than a line: three corners of different rings may lie on one."""
+    """True if a ring (k, 2) encloses more than a line, since corners of different rings may be collinear."""
     x, y = (ring - ring[0]).T
     around = float(np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).sum())
     return bool(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > _SAME_MM * around)
 
 
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int]:
-    """Two cells as one, without their common side, which goes from a to b in the first one."""
+    """Join two rings of corner indices across their common side, which leads from a to b in the first ring."""
     i = first.index(b)
     k = second.index(a)
     return [*first[i:], *first[:i], *(second[k:] + second[:k])[1:-1]]
 
 
 def is_convex(ring: Array) -> bool:
-    """Whether no corner of a ring, counter-clockwise, turns to the right."""
+    """True if no corner of a counter-clockwise ring (k, 2) turns to the right."""
     into = ring - np.roll(ring, 1, axis=0)
     out = np.roll(ring, -1, axis=0) - ring
     across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
@@ -72,11 +77,13 @@ def is_convex(ring: Array) -> bool:
 
 
 def find_bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, float]]) -> Array | None:
-    """A convex area around a bore inside of the free one, counter-clockwise; None if there is no room for one.
+    """Find a convex ring around a bore inside a free area, counter-clockwise; None if there is no room for one.
 
     Args:
-        radius: Of the corners of its widest polygon.
-        others: Middles and radii of the other bores: between two bores each has its side.
+        free: Shapely area.
+        at: (2,), centre of the bore.
+        radius: Distance of the corners of the bore's widest polygon from its centre.
+        others: Centres and radii of the other bores; a line between two bores separates their cells.
     """
     for reach in (radius * share for share in _REACHES):
         square = list_rings(box(*(at - reach), *(at + reach)), 1.0)[0]
@@ -94,7 +101,7 @@ def find_bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array
 
 
 def clip(ring: Array, n: Array, d: float) -> Array:
-    """What of a convex area has n . x <= d; (0, 2) if nothing has."""
+    """Clip a convex ring (k, 2) to the half plane n . x <= d; (0, 2) if nothing is left."""
     kept: list[tuple[float, float]] = []
     heights = (ring @ n - d).tolist()
     corners = ring.tolist()
@@ -112,7 +119,7 @@ def clip(ring: Array, n: Array, d: float) -> Array:
 
 
 def cut_wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
-    """A convex area around a point cut into sectors: the middle direction of each, (2,), and its area, (k, 2)."""
+    """Cut a convex ring around a point into equal sectors; return the middle direction (2,) and ring (k, 2) of each."""
     sectors = []
     for i in range(sides):
         a, b, m = (2.0 * np.pi * (i + off) / sides for off in (-0.5, 0.5, 0.0))
@@ -124,16 +131,18 @@ def cut_wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
 
 
 def cut_bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array]:
-    """Convex areas, (4, 2) each, behind the sides of rings that recede; none where there is no room for them.
+    """Convex quadrilaterals, (4, 2) each, in the material behind receding sides; none for a ring without room for them.
 
     Args:
-        area: All of the material.
-        rings: Corners (k, 2), the material to their left, and whether the side that begins there recedes, (k,).
+        area: All of the material, a shapely area.
+        rings: Corners (k, 2), with the material to their left; and a mask (k,), True if the side that begins at the
+            corner recedes.
     """
     return [quad for corners, fit in rings if fit.any() for quad in _band(area, corners, fit)]
 
 
 def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
+    """The quadrilaterals of one ring, with the largest width at which they are convex, disjoint and inside the area."""
     for width in _WIDTHS_MM:
         inner = [_inner(corners, fit, i, width) for i in range(len(corners))]
         sides = [(int(i), (int(i) + 1) % len(corners)) for i in np.flatnonzero(fit)]
@@ -148,7 +157,10 @@ def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
 
 
 def _inner(corners: Array, fit: NDArray[np.bool_], i: int, width: float) -> tuple[Array, Array]:
-    """The inner corners, at corner i, of the band of the side that ends there, and of that of the side that begins."""
+    """The inner corners of the bands at corner i: of the side that ends there, then of the side that begins there.
+
+    They are equal where both sides recede.
+    """
     here = corners[i]
     into = here - corners[i - 1]
     out = corners[(i + 1) % len(corners)] - here

@@ -1,4 +1,4 @@
-"""Extrude outlines with holes and bores into prisms."""
+"""Extrude outlines with holes and bores into bodies made of convex pieces; lengths in mm."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,22 +34,23 @@ from apo_bench.scenario.parts.making.outline import (
 )
 
 _NARROW_MM = 6e-3
+"""A narrower ring between two steps of a bore is no face."""
 
 
 @final
 @dataclass(frozen=True)
 class Bore:
-    """A round hole along the way of the extrusion; its steps do not overlap, and may leave lengths without a hole."""
+    """A round hole along the direction of extrusion; its steps do not overlap, and need not cover the whole length."""
 
     at: tuple[float, float]
-    """[mm]."""
+    """Its axis, [mm]."""
     steps: tuple[Frustum, ...]
     flats: Mapping[float, str] | None = None
     """Height -> name of the flat face there: the bottom of a blind bore, the ledge of a wider one."""
 
     @property
     def widest(self) -> float:
-        """How far the corners of its widest polygon are from its axis, [mm]."""
+        """Distance of the corners of its widest polygon from its axis, [mm]."""
         return max(max(step.radii) / np.cos(np.pi / step.count) for step in self.steps)
 
 
@@ -66,9 +67,16 @@ def bore(
     chamfer_high: float = 0.0,
     sides: int | None = None,
 ) -> Bore:
-    """A cylindrical bore from one height to another one, with chamfers of 45 degrees, [mm].
+    """A cylindrical bore between two heights, with chamfers of 45 degrees, [mm].
 
     The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
+
+    Args:
+        at: Its axis.
+        fit: The wall recedes by the clearance.
+        chamfer_low: Length of the chamfer at the lower end; 0: none.
+        chamfer_high: Length of the chamfer at the upper end; 0: none.
+        sides: Number of sides of its polygon. Default: as a contact needs if it has a name, else few.
     """
     wall = Frustum(low, high, radius, name=name, fit=fit, sides=sides)
     return Bore(at, tuple(chamfer(wall, chamfer_low, chamfer_high, 1.0)))
@@ -86,17 +94,18 @@ def extrude(
     top: str = "",
     fit: Sequence[str] = (),
 ) -> Body:
-    """A prism along z, from one height to another one, [mm].
+    """A prism along z between two heights, [mm].
 
     Args:
-        holes: Outlines, counter-clockwise too, that go all the way through.
-        bores: Round holes, cut into wedges that are tangent to them; what has no room for its own wedges, and is a
-            cylinder all the way through, becomes a hole like others.
-        bottom: Name of the lower face; else one is found.
-        fit: Which of the two end faces, by name, recede by the clearance.
+        holes: Outlines of through holes, counter-clockwise too.
+        bores: Round holes; the material around each is cut into wedges tangent to it. A cylindrical through bore
+            without room for wedges becomes a hole like the others.
+        bottom: Name of the lower face; "": named later.
+        top: Name of the upper face; "": named later.
+        fit: Names of the end faces that recede by the clearance.
 
     Raises:
-        ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
+        ValueError: Holes or bores meet each other or the outline, or a stepped bore has no room for wedges.
     """
     area = Polygon(trace_outline(outline), [trace_outline(hole, hole=True) for hole in holes])
     discs = [Polygon(circumscribe_polygon(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
@@ -106,6 +115,7 @@ def extrude(
     beside = _bands(area, outline, holes)
     rest = area.difference(unary_union([Polygon(band) for band in beside]))
     cells = _cells(rest, bores)
+    # The first bore without room for a cell becomes a hole, and the extrusion starts over.
     if len(cells) < len(bores):
         hole = _as_hole(bores[len(cells)], low, high)
         others = [*bores[: len(cells)], *bores[len(cells) + 1 :]]
@@ -132,20 +142,22 @@ def extrude(
 
 
 def _bands(area: Any, outline: Outline, holes: Sequence[Outline]) -> list[Array]:
-    """Areas behind the sides that recede, of outlines and holes of which an arc does."""
+    """Quadrilaterals, (4, 2) each, behind the receding sides of those outlines that have a receding arc."""
     rings = [] if not _round_fit(outline) else [(trace_outline(outline), receding(outline))]
     for hole in filter(_round_fit, holes):
         fit = receding(hole, hole=True)
+        # Reversed, so that the material is to the left; the mask moves with the sides.
         rings.append((trace_outline(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
     return cut_bands(area, rings)
 
 
 def _round_fit(outline: Outline) -> bool:
+    """True if an arc of the outline recedes by the clearance."""
     return any(edge.fit and edge.center is not None for edge in outline)
 
 
 def _as_hole(each: Bore, low: float, high: float) -> Outline:
-    """A bore that is a cylinder all the way through as the outline of a hole."""
+    """The outline of a cylindrical through bore; any other bore raises a `ValueError`."""
     step = each.steps[0]
     through = abs(step.low - low) < 1e-6 and abs(step.high - high) < 1e-6 and step.radii[0] == step.radii[1]
     if len(each.steps) > 1 or not through:
@@ -154,7 +166,7 @@ def _as_hole(each: Bore, low: float, high: float) -> Outline:
 
 
 def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
-    """A convex area around each bore, none of which overlap, up to the first one that has no room for one."""
+    """Disjoint convex rings around the bores, in their order; fewer than the bores if one has no room for a ring."""
     cells: list[Array] = []
     for i, each in enumerate(bores):
         others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]
@@ -167,7 +179,7 @@ def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
 
 
 def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
-    """The pieces of a cell around a bore, corners (k, 3) each."""
+    """The convex pieces of a cell around a bore, between its steps; corners (k, 3) each, [mm]."""
     heights = heights_of(each.steps, low, high)
     at = np.array(each.at)
     for a, b in pairwise(heights):
@@ -183,12 +195,18 @@ def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
 
 
 def _each_once(flat: Array) -> Array:
-    """A ring without corners that are the same."""
+    """The ring (k, 2) without repeated corners."""
     return flat[np.linalg.norm(flat - np.roll(flat, 1, axis=0), axis=1) > 1e-6]
 
 
 def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[Face], list[RoundFace]]:
-    """What becomes of the sides of an outline: flat faces of the straight ones, walls of the arcs."""
+    """The side faces of an extruded outline: flat faces of straight sides, and round walls of arcs.
+
+    Consecutive arcs of one circle and name become one wall.
+
+    Args:
+        hole: True if the outline is that of a hole.
+    """
     flats: list[Face] = []
     rounds: list[RoundFace] = []
     arcs = [arc_of(outline, i) for i in range(len(outline))]
@@ -198,6 +216,7 @@ def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[
             corners = np.array([(*edge.start, low), (*b, low), (*b, high), (*edge.start, high)])
             flats.append(Face(edge.name, 1e-3 * (corners[::-1] if hole else corners), fit=edge.fit))
             continue
+        # An arc that continues the one before is part of its wall.
         if goes_on(arcs[i - 1], arc) and outline[i - 1].name == edge.name and i > 0:
             continue
         extent = abs(arc.turn)
@@ -234,6 +253,8 @@ def _ends(
     top: str,
     fit: Sequence[str],
 ) -> Iterator[Face]:
+    """The lower and the upper face, with openings for holes and bores."""
+    # `above`: the bore just inside of the material, above the lower end and below the upper one.
     for z, name, above in ((low, bottom, True), (high, top, False)):
         openings = [circumscribe_polygon(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
         inner = [*(trace_outline(hole, hole=True) for hole in holes), *openings]
@@ -241,7 +262,7 @@ def _ends(
 
 
 def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
-    """The flat faces across a bore, between its ends."""
+    """The flat faces inside a bore: ledges between steps of different radius, and the bottom of a blind bore."""
     for z in heights_of(each.steps):
         if z - low < 1e-6 or high - z < 1e-6:
             continue
@@ -255,7 +276,12 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
 
 
 def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
-    """A level face from rings in mm, all counter-clockwise, that looks up or down."""
+    """A horizontal face at height z.
+
+    Args:
+        outline: (k, 2), counter-clockwise, [mm]; like the holes.
+        up: True if the face looks up, False if it looks down.
+    """
     turned = [1e-3 * raise_to(straighten(each), z) for each in (outline, *holes)]
     outside, *inside = turned if up else [each[::-1] for each in turned]
     return Face(name, outside, tuple(hole[::-1] for hole in inside), fit)

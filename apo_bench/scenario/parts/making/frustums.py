@@ -1,4 +1,4 @@
-"""Frustums: the lengths of a bore or a shaft along its axis."""
+"""Frustums: cylindrical or conical steps along the axis of a bore or a shaft, in mm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,33 +11,37 @@ from apo_bench.scenario.parts.making.moments import Moments, frustum_moments, su
 from apo_bench.scenario.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6
+"""Heights that differ by less are equal."""
 
 
 @final
 @dataclass(frozen=True)
 class Frustum:
-    """One length of a bore or of a shaft, a cylinder or a cone, [mm]."""
+    """One step of a bore or a shaft, a cylinder or a cone, [mm]."""
 
     low: float
-    """Where it begins along the axis."""
+    """Height of its lower end."""
     high: float
+    """Height of its upper end."""
     radius: float
-    """Where it begins."""
+    """Radius at the lower end."""
     end_radius: float | None = None
-    """Where it ends, of a cone."""
+    """Radius at the upper end; None: a cylinder."""
     name: str = ""
-    """Of its wall; else one is found."""
+    """Name of its wall; "": named later."""
     fit: bool = False
+    """The wall recedes by the clearance."""
     sides: int | None = None
-    """Into how many its wall is cut; else as a contact needs if it has a name, and few if not."""
+    """Number of sides of its polygon; None: as a contact needs if it has a name, else few."""
 
     @property
     def radii(self) -> tuple[float, float]:
+        """Radius at the lower and at the upper end."""
         return self.radius, self.radius if self.end_radius is None else self.end_radius
 
     @property
     def count(self) -> int:
-        """Into how many sides its wall is cut."""
+        """Number of sides of its polygon."""
         return needed_sides(self.sides, self.name, max(self.radii))
 
     def at(self, height: float) -> float:
@@ -46,15 +50,15 @@ class Frustum:
         return a + (b - a) * (height - self.low) / (self.high - self.low)
 
     def covers(self, low: float, high: float) -> bool:
-        """Whether a shorter length lies in it."""
+        """True if the step includes all heights from low to high."""
         return self.low - _SAME_MM <= low and high <= self.high + _SAME_MM
 
     def moments(self) -> Moments:
-        """[mm]."""
+        """Its exact moments, [mm]."""
         return frustum_moments(self.low, self.high, *self.radii)
 
     def wall(self, at: tuple[float, float], hole: bool) -> RoundFace:
-        """Its face, about an axis along z."""
+        """Its round face, [m], about the axis along z through `at`, [mm]."""
         a, b = self.radii
         span = (1e-3 * self.low, 1e-3 * self.high)
         point = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0])
@@ -62,11 +66,14 @@ class Frustum:
 
 
 def chamfer(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
-    """A cylinder with chamfers of 45 degrees in its length, [mm]; those of `name` are `name_chamfer_low` and `.._high`.
+    """Chamfer the ends of a cylinder by 45 degrees; return its steps from low to high.
+
+    The total length does not change. The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
 
     Args:
-        at_low: How long the chamfer at its beginning is; 0: there is none.
-        sign: 1 if they are wider than the cylinder, as in a bore, -1 if they are narrower, as on a shaft.
+        at_low: Length of the chamfer at the lower end, [mm]; 0: none.
+        at_high: Length of the chamfer at the upper end, [mm]; 0: none.
+        sign: 1 if the chamfers are wider than the cylinder (bore), -1 if they are narrower (shaft).
     """
     r = wall.radius
     called = wall.name and f"{wall.name}_chamfer"
@@ -82,13 +89,13 @@ def chamfer(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[F
 
 
 def subtract_steps(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
-    """What is left of moments without those of some lengths about an axis along z."""
+    """Subtract the moments of steps about the axis along z through `at` from given moments, [mm]."""
     there = np.array([*at, 0.0])
     return sum_moments(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
 
 
 def raise_to(flat: Array, z: float) -> Array:
-    """Points of a plane, (k, 2), at a height, (k, 3)."""
+    """Points (k, 3) above points (k, 2) of the xy plane, at height z."""
     return np.column_stack([flat, np.full(len(flat), z)])
 
 
@@ -98,7 +105,7 @@ def prism(flat: Array, low: float, high: float) -> Array:
 
 
 def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
-    """Radius and sides just above or just below a height; (0, 0) where no step is."""
+    """Radius and number of sides just above or just below a height; (0, 0) if no step is there."""
     for step in steps:
         up = step.low - _SAME_MM <= height < step.high - _SAME_MM
         down = step.low + _SAME_MM < height <= step.high + _SAME_MM
@@ -108,17 +115,17 @@ def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[flo
 
 
 def heights_of(steps: Sequence[Frustum], *more: float) -> list[float]:
-    """Where steps begin and end, and other heights, ascending, each once."""
+    """All heights at which steps begin or end, and `more` heights, ascending, each once."""
     every = np.sort([*more, *(h for step in steps for h in (step.low, step.high))])
     return [float(h) for h in every[np.diff(every, prepend=-np.inf) > _SAME_MM]]
 
 
 def circumscribe_polygon(at: tuple[float, float], radius: float, sides: int) -> Array:
-    """A polygon, (k, 2), counter-clockwise, whose sides touch a circle from outside."""
+    """A regular polygon (k, 2), counter-clockwise, whose sides are tangent to a circle from outside."""
     return inscribe_polygon(at, radius / np.cos(np.pi / sides), sides)
 
 
 def inscribe_polygon(at: tuple[float, float], radius: float, sides: int) -> Array:
-    """A polygon, (k, 2), counter-clockwise, whose corners lie on a circle; no corner, but a side lies towards +x."""
+    """A regular polygon (k, 2), counter-clockwise, with corners on a circle; the middle of one side faces +x."""
     angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     return np.asarray(np.array(at) + radius * np.column_stack([np.cos(angle), np.sin(angle)]))

@@ -1,4 +1,4 @@
-"""Moments of exact shapes up to the second: volume, centroid and inertia."""
+"""Exact moments of flat and solid shapes up to second order, for volume, centroid and inertia."""
 
 from collections.abc import Iterable
 from functools import reduce
@@ -10,26 +10,30 @@ from apo_bench.geometry import Array
 
 
 class Moments(NamedTuple):
-    """The integrals of 1, x and x x^T over a shape; of a flat one x is (2,), of a solid (3,)."""
+    """The integrals of 1, x and x x^T over a shape; x is (2,) for a flat one, (3,) for a solid."""
 
     size: float
+    """Area or volume."""
     first: Array
+    """(2,) or (3,)."""
     second: Array
+    """(2, 2) or (3, 3)."""
 
     def plus(self, other: "Moments", sign: float = 1.0) -> "Moments":
+        """The sum with those of another shape; the difference if `sign` is -1."""
         return Moments(
             self.size + sign * other.size, self.first + sign * other.first, self.second + sign * other.second
         )
 
     def moved(self, R: Array, t: Array) -> "Moments":
-        """Of the shape after x -> R x + t."""
+        """The moments of the shape after x -> R x + t."""
         m = R @ self.first
         second = R @ self.second @ R.T + np.outer(m, t) + np.outer(t, m) + self.size * np.outer(t, t)
         return Moments(self.size, m + self.size * t, second)
 
     @property
     def in_metres(self) -> "Moments":
-        """Of a solid whose lengths are in mm."""
+        """The moments of a solid converted from mm to m."""
         return Moments(1e-9 * self.size, 1e-12 * self.first, 1e-15 * self.second)
 
     @property
@@ -38,21 +42,21 @@ class Moments(NamedTuple):
 
     @property
     def inertia(self) -> Array:
-        """Of density 1 about the centroid, (3, 3)."""
+        """The inertia (3, 3) about the centroid, for density 1."""
         S = self.second - self.size * np.outer(self.centroid, self.centroid)
         return np.asarray(np.trace(S) * np.eye(3) - S)
 
 
 def sum_moments(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
-    """Those of one shape and of others, or less others, one after the other."""
+    """Add the moments of other shapes, or subtract them if `sign` is -1."""
     return reduce(lambda moments, other: moments.plus(other, sign), others, first)
 
 
 def polygon_moments(ring: Array) -> Moments:
-    """Of the area inside a ring (k, 2), counter-clockwise."""
+    """The moments of the area inside a counter-clockwise ring (k, 2)."""
     x, y = ring.T
     u, v = np.roll(ring, -1, axis=0).T
-    # Green's theorem over the edges from (x, y) to (u, v), with c twice the area of the triangle to the origin.
+    # Green's theorem over the edges from (x, y) to (u, v); c is twice the area of the triangle with the origin.
     c = x * v - u * y
     first = np.array([(x + u) @ c, (y + v) @ c]) / 6.0
     xx = (x * x + x * u + u * u) @ c / 12.0
@@ -62,12 +66,12 @@ def polygon_moments(ring: Array) -> Moments:
 
 
 def segment_moments(center: Array, radius: float, middle: float, extent: float) -> Moments:
-    """Of what lies between an arc and its chord.
+    """The moments of the circular segment between an arc and its chord.
 
     Args:
-        center: (2,).
+        center: (2,), centre of the circle.
         middle: Direction from the centre to the middle of the arc, [rad].
-        extent: Of the arc, [rad].
+        extent: Angle of the arc, [rad].
     """
     a = extent / 2.0
     r = radius
@@ -82,7 +86,7 @@ def segment_moments(center: Array, radius: float, middle: float, extent: float) 
 
 
 def extrude_moments(flat: Moments, low: float, high: float) -> Moments:
-    """Of the prism over a flat shape, from one height to another one."""
+    """The moments of the prism over a flat shape between two heights."""
     h = high - low
     z1 = (high**2 - low**2) / 2.0
     z2 = (high**3 - low**3) / 3.0
@@ -94,7 +98,7 @@ def extrude_moments(flat: Moments, low: float, high: float) -> Moments:
 
 
 def frustum_moments(low: float, high: float, r_low: float, r_high: float) -> Moments:
-    """Of a cylinder or a cone about the z axis, from one height and radius to another one."""
+    """The moments of a cylinder or a truncated cone about the z axis, between two heights with their radii."""
     # The radius is linear in z, so the integrands are polynomials: up to degree 7 four Gauss points are exact.
     nodes, weights = np.polynomial.legendre.leggauss(4)
     z = low + (high - low) * (nodes + 1.0) / 2.0

@@ -1,4 +1,4 @@
-"""Flat outlines of lines and arcs, [mm]."""
+"""Closed outlines of straight sides and arcs, [mm]: their construction, their polygons and their moments."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,49 +12,53 @@ from apo_bench.geometry import Array, count_sides
 from apo_bench.scenario.parts.making.moments import Moments, polygon_moments, segment_moments
 
 COARSE_SIDES = 12
-"""Of a whole turn of a round wall without a name, which no contact uses."""
+"""Sides of a full circle for a round wall without a name, which no contact uses."""
 _SAME_MM = 1e-6
+"""Lengths that differ by less are equal."""
 
 
 @final
 @dataclass(frozen=True)
 class Edge:
-    """A side of an outline, from `start` to where the next one starts."""
+    """A side of an outline, from `start` to the start of the next side."""
 
     start: tuple[float, float]
     """[mm]."""
     name: str = ""
-    """Of the face that it becomes; else one is found."""
+    """Name of the face that it becomes; "": named later."""
     fit: bool = False
+    """The face recedes by the clearance."""
     center: tuple[float, float] | None = None
-    """Of an arc, [mm]."""
+    """Centre of an arc, [mm]; None for a straight side."""
     clockwise: bool = False
-    """The way of the arc."""
+    """Direction of an arc."""
     sides: int | None = None
-    """Into how many a whole turn is cut; else as a contact needs if the arc has a name, and few if not."""
+    """Sides of the polygon of a full circle; None: as a contact needs if the arc has a name, else few."""
 
 
 Outline = Sequence[Edge]
-"""A closed one, counter-clockwise; of a hole too."""
+"""The sides of a closed outline, counter-clockwise, also if it is that of a hole."""
 
 
 class OutlineArc(NamedTuple):
     """An arc of an outline."""
 
     center: Array
+    """(2,), [mm]."""
     radius: float
     first: float
     """Angle at its start, [rad]."""
     turn: float
-    """To its end, [rad]; negative is clockwise."""
+    """Angle from its start to its end, [rad]; negative is clockwise."""
 
     def at(self, angle: Any, radius: float | None = None) -> Array:
-        """The point at an angle, (2,), or points at angles, (k, 2), on the arc or on a circle about its centre."""
+        """The point (2,) at an angle, or points (k, 2) at angles, on its circle or on one of another radius."""
         r = self.radius if radius is None else radius
         return np.asarray(self.center + r * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
     @property
     def middle(self) -> float:
+        """Angle of its middle, [rad]."""
         return self.first + self.turn / 2.0
 
 
@@ -62,11 +66,11 @@ class OutlineArc(NamedTuple):
 def make_polygon(
     *corners: tuple[float, float], names: Mapping[int, str] | Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
-    """Straight sides; side i leads from corner i to the next one.
+    """Make a polygon; side i leads from corner i to the next corner.
 
     Args:
-        names: Of the sides; those without one, or "", are named later.
-        fit: Which named sides recede by the clearance.
+        names: Names of the sides; a side without one, or with "", is named later.
+        fit: Names of the sides that recede by the clearance.
     """
     named = dict(names) if isinstance(names, Mapping) else dict(enumerate(names))
     return [Edge(at, named.get(i, ""), named.get(i, "") in fit and i in named) for i, at in enumerate(corners)]
@@ -76,7 +80,7 @@ def make_polygon(
 def make_rectangle(
     width: float, depth: float, at: tuple[float, float] = (0.0, 0.0), names: Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
-    """A rectangle about its middle; its sides are, in this order, at -y, +x, +y, -x."""
+    """Make a rectangle with its centre at `at`; its sides are, in this order, at -y, +x, +y, -x."""
     x, y = at
     a = width / 2.0
     b = depth / 2.0
@@ -87,7 +91,7 @@ def make_rectangle(
 def make_circle(
     radius: float, at: tuple[float, float] = (0.0, 0.0), name: str = "", fit: bool = False, sides: int | None = None
 ) -> Outline:
-    """A whole turn, as two arcs that become one face."""
+    """Make a circle, of two arcs that become one face."""
     return [Edge((at[0] + sign * radius, at[1]), name, fit, at, sides=sides) for sign in (1.0, -1.0)]
 
 
@@ -99,7 +103,7 @@ def make_slot(
     names: Sequence[str] = ("", "", "", ""),
     fit: bool = False,
 ) -> Outline:
-    """A slot along x with round ends, as long over all; its sides are, in this order, at -y, +x, +y, -x."""
+    """Make a slot along x with round ends, of a total `length`; its sides are, in this order, at -y, +x, +y, -x."""
     x, y = at
     a = (length - width) / 2.0
     r = width / 2.0
@@ -118,6 +122,7 @@ def round_corners(outline: Outline, radius: float, sides: int | None = None) -> 
         out = points[(i + 1) % len(points)] - points[i]
         into = into / np.linalg.norm(into)
         out = out / np.linalg.norm(out)
+        # The exterior angle at the corner, and the distance of the tangent points from it.
         turn = float(np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out))
         back = radius * abs(np.tan(turn / 2.0))
         a = points[i] - back * into
@@ -129,7 +134,7 @@ def round_corners(outline: Outline, radius: float, sides: int | None = None) -> 
 
 
 def arc_of(outline: Outline, i: int) -> OutlineArc | None:
-    """The arc of side i; None if it is straight."""
+    """The arc of side i; None if the side is straight. Ends at different distances raise a `ValueError`."""
     edge = outline[i]
     after = outline[(i + 1) % len(outline)]
     if edge.center is None:
@@ -145,20 +150,24 @@ def arc_of(outline: Outline, i: int) -> OutlineArc | None:
 
 
 def trace_outline(outline: Outline, hole: bool = False) -> Array:
-    """The corners of an outline, (k, 2), [mm].
+    """The polygon of an outline, (k, 2), [mm].
 
-    Arcs that bulge out of the material have their corners on the circle; those that bulge into it are tangent to it
-    from outside, so that what is free inside of them stays free.
+    An arc that bulges out of the material has its corners on the circle. The polygon of one that bulges into the
+    material is tangent to the circle from outside, so that the space inside the circle stays free.
+
+    Args:
+        hole: True if the outline is that of a hole.
     """
     return np.array([corner for i in range(len(outline)) for corner in _corners(outline, i, hole)])
 
 
 def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
-    """Whether the sides of a ring recede by the clearance: each that begins at a corner of `trace_outline`, (k,)."""
+    """(k,), True for each side of the polygon of `trace_outline` that recedes by the clearance."""
     return np.array([edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)], dtype=np.bool_)
 
 
 def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
+    """Yield the corners (2,) of the polygon of side i, without its end."""
     edge = outline[i]
     arc = arc_of(outline, i)
     start = np.array(edge.start, dtype=np.float64)
@@ -167,7 +176,7 @@ def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
         return
     share = abs(arc.turn) / (2.0 * np.pi)
     n = max(2, int(np.ceil(share * needed_sides(edge.sides, edge.name, arc.radius) - 1e-9)))
-    if hole != edge.clockwise:
+    if hole != edge.clockwise:  # bulges into the material
         step = arc.turn / n
         if not goes_on(arc_of(outline, i - 1), arc):
             yield start
@@ -178,7 +187,7 @@ def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
 
 
 def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
-    """Whether an arc continues another one on its circle."""
+    """True if an arc continues the one before on the same circle, in the same direction."""
     return (
         before is not None
         and bool(np.abs(before.center - arc.center).max() < _SAME_MM)
@@ -188,12 +197,12 @@ def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
 
 
 def needed_sides(stated: int | None, name: str, radius_mm: float) -> int:
-    """Into how many sides a whole turn of a wall is cut: as stated, as a contact needs if it has a name, or few."""
+    """Sides of the polygon of a full circle: as stated, else as a contact needs if it has a name, else few."""
     return stated or (count_sides(1e-3 * radius_mm) if name else COARSE_SIDES)
 
 
 def outline_moments(outline: Outline) -> Moments:
-    """Of the exact area inside, arcs included, [mm]."""
+    """The moments of the exact area inside an outline, arcs included, [mm]."""
     moments = polygon_moments(np.array([edge.start for edge in outline], dtype=np.float64))
     for i in range(len(outline)):
         arc = arc_of(outline, i)

@@ -1,4 +1,4 @@
-"""Bodies of revolution."""
+"""Make bodies of revolution, such as shafts and rings, from steps along the z axis; lengths in mm."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -24,7 +24,9 @@ from apo_bench.scenario.parts.making.frustums import (
 from apo_bench.scenario.parts.making.moments import sum_moments
 
 _SAME_MM = 1e-6
+"""Radii that differ by less are equal; a smaller radius is a point."""
 _NARROW_MM = 6e-3
+"""Narrower rings are slivers between two polygons of one circle, and no faces."""
 
 
 @check_arguments
@@ -36,12 +38,12 @@ def revolve(
 ) -> Body:
     """A body of revolution about z, [mm].
 
-    Lengths without a bore are true cylinders, or cones with corners on their edges; those with one are wedges, tangent
-    to the bore from outside, with corners on the outer wall.
+    A solid step is an exact cylinder, or a cone with corners on its end circles. A step with a bore consists of wedges,
+    tangent to the bore from outside, with corners on the outer wall.
 
     Args:
-        outer: Its lengths, one after the other.
-        inner: Those of its bore, inside of the outer ones.
+        outer: Steps of the outer wall, one after the other.
+        inner: Steps of its bore, inside the outer wall.
         flats: Height -> name of the flat face there: ends, shoulders, the bottom of a blind bore.
     """
     heights = heights_of((*outer, *inner))
@@ -68,13 +70,23 @@ def make_shaft(
     bottom: str = "",
     top: str = "",
 ) -> Body:
-    """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
+    """A cylinder along z with chamfers of 45 degrees, [mm].
+
+    The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
+
+    Args:
+        name: Name of the cylindrical wall.
+        chamfer_low: Length of the chamfer at the lower end; 0: none.
+        chamfer_high: Length of the chamfer at the upper end; 0: none.
+        bottom: Name of the lower face; "": named later.
+        top: Name of the upper face; "": named later.
+    """
     steps = chamfer(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
     return revolve(steps, flats={low: bottom, high: top})
 
 
 def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
-    """The pieces between two heights between which nothing changes."""
+    """The pieces between heights a and b, between which no step begins or ends."""
     around = next((s for s in outer if s.covers(a, b)), None)
     bore = next((s for s in inner if s.covers(a, b)), None)
     if around is None:
@@ -96,16 +108,17 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
 
 
 def _ring(radius: float, sides: int, z: float) -> Array:
-    """The corners of a level polygon on a circle; its middle, if it is a point."""
+    """The corners (k, 3) of a horizontal polygon on a circle; one point (1, 3) if the radius is 0."""
     if radius < _SAME_MM:
         return np.array([[0.0, 0.0, z]])
     return raise_to(inscribe_polygon((0.0, 0.0), radius, sides), z)
 
 
 def _flats(outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str) -> Iterator[Face]:
-    """The rings that look up or down at a height: what is full below and not above, or above and not below."""
+    """The horizontal faces at height z: solid below and free above (looks up), or the reverse (looks down)."""
     areas = []
     for above in (False, True):
+        # R, n: radius and sides of the outer wall; r, k: those of the bore; both get the larger number of sides.
         R, n = at_height(outer, z, above)
         r, k = at_height(inner, z, above)
         n, k = (max(n, k), max(n, k)) if n and k else (n, k)

@@ -1,4 +1,4 @@
-"""Write bodies as part files."""
+"""Turn a body into a solid with named pieces and faces, and write it as a part file."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -16,14 +16,16 @@ from apo_bench.scenario.parts.making.body import Body
 from apo_bench.scenario.parts.stated import PART_SCHEMA
 
 _ALIGNED = 1e-9
+"""Tolerance within which directions and corners agree with the axes of the frame."""
 _STEEL = (0.70, 0.72, 0.75)
+"""Default colour: red, green, blue."""
 
 
 def build_solid(name: str, body: Body) -> Solid:
-    """The solid: pieces called `p1`, `p2`, ..., faces without a name `auto_px_1`, `auto_flat_1`, `auto_bore_1`, ...
+    """Make the solid of a body; pieces become `p1`, `p2`, ..., unnamed faces `auto_px_1`, `auto_flat_1`, `auto_bore_1`.
 
     Raises:
-        ValueError: Two faces have one name.
+        ValueError: Two faces have the same name.
     """
     named = [face.name for faces in (body.flats, body.rounds) for face in faces if face.name]
     if len(set(named)) < len(named):
@@ -45,7 +47,7 @@ _Some = TypeVar("_Some", Face, RoundFace)
 
 
 def _called(faces: Iterable[_Some]) -> list[_Some]:
-    """Faces, each with a name: those without get one, with a number that counts all of their kind, and come last."""
+    """Name the faces without a name `auto_KIND_NUMBER`, numbered among all faces of their kind; these come last."""
     counts: dict[str, int] = {}
     named = []
     for face in faces:
@@ -56,13 +58,14 @@ def _called(faces: Iterable[_Some]) -> list[_Some]:
 
 
 def _place(face: Face) -> tuple[float, ...]:
-    """Height of a face along the axis that it looks along, then its lowest corner: the order of faces of boxes."""
+    """Sort key of a flat face: its height along its main axis, then its lowest coordinates along the next axes."""
     axis = int(np.abs(face.normal).argmax())
     low = face.outline.min(axis=0)
     return tuple(round(float(low[i % 3]), 9) for i in (axis, axis + 1, axis + 2))
 
 
 def _stem(face: Face | RoundFace) -> str:
+    """The kind of a face in automatic names, such as `bore`, `flat`, or `px` for a face that looks along +x."""
     if isinstance(face, RoundFace):
         return {"cylinder": "bore" if face.hole else "shaft", "cone": "cone", "rim": "rim"}[face.kind]
     axis = int(np.abs(face.normal).argmax())
@@ -72,7 +75,7 @@ def _stem(face: Face | RoundFace) -> str:
 
 
 def _piece(name: str, hull: Hull) -> Piece:
-    """A piece; a box where it is one."""
+    """The named piece, as a `Box` if the hull is an axis-aligned box."""
     if hull.cylinder is None and len(hull.corners) == 8 and hull.half.min() >= THINNEST_M:
         box = Box(name, hull.center, hull.half)
         if np.abs(hull.corners[:, None] - box.corners[None]).max(axis=2).min(axis=0).max() < _ALIGNED:
@@ -92,14 +95,17 @@ def write_part(
     licence: str,
     title: str = "",
 ) -> Path:
-    """Write `NAME.xml` and, unless all of its pieces are boxes, `NAME.toml`, so that `load_part` gives back the solid.
+    """Write `NAME.xml` and, unless all pieces are boxes, `NAME.toml`, so that `load_part` returns the same solid.
 
     Args:
         density: [kg/m^3].
-        friction: Sliding, turning, rolling.
+        friction: Sliding, torsional, rolling, as in MJCF.
         color: Red, green, blue, 0 to 1.
-        source: Where the shape comes from.
-        title: What a person calls the part, in any letters.
+        source: Origin of the shape.
+        title: Name for people, in any letters.
+
+    Returns:
+        The path of `NAME.xml`.
     """
     require(is_name(name), f"the name '{name}' of a part must be a letter, then letters, digits and underscores.")
     require(density > 0.0, f"a density of {density:g} kg/m^3 was given; a number above 0 is allowed.")
@@ -118,10 +124,12 @@ def write_part(
 
 
 def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
+    """The MJCF document of a part; `attributes` are those of its default geom."""
     root = Element("mujoco", model=solid.name)
     default = SubElement(root, "default")
     SubElement(default, "geom", type="box" if all_boxes(solid.pieces) else "mesh", **attributes)
     meshes = [p for p in solid.pieces if isinstance(p, Hull) and p.cylinder is None]
+    # Sites name the faces of a part of boxes; other parts have their faces in the TOML file.
     if all_boxes(solid.pieces):
         SubElement(default, "site", size="0.0015", group="4")
         SubElement(SubElement(default, "default", {"class": "fit"}), "site", size="0.002", group="4")
@@ -141,6 +149,7 @@ def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
 
 
 def _geom(piece: Piece) -> dict[str, Any]:
+    """The attributes of the geom of a piece."""
     if isinstance(piece, Box):
         return {"type": "box", "pos": _words(piece.center), "size": _words(piece.half)}
     if piece.cylinder is None:
@@ -150,7 +159,7 @@ def _geom(piece: Piece) -> dict[str, Any]:
 
 
 def _inside(face: Face) -> Array:
-    """A point of a face, well inside of it."""
+    """A point (3,) inside an axis-aligned face, away from its edges, [m]."""
     axis = int(np.abs(face.normal).argmax())
     plane = [(axis + 1) % 3, (axis + 2) % 3]
     point = make_flat_area(face.outline, face.holes, np.eye(3)[:, plane]).representative_point()
@@ -162,8 +171,9 @@ def _inside(face: Face) -> Array:
 def stated_text(
     solid: Solid, density: float, friction: Sequence[float], source: str, licence: str, title: str = ""
 ) -> str:
-    """Return the text of `NAME.toml`."""
+    """Return the text of `NAME.toml`: faces, volume, centroid, inertia and material of a part."""
     assert solid.inertia is not None
+    # xx, yy, zz, xy, xz, yz
     six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     document = {
         "schema": PART_SCHEMA,
@@ -202,11 +212,12 @@ def _round_table(wall: RoundFace) -> dict[str, Any]:
 
 
 def _list(values: Array, digits: int = 9) -> Any:
-    """Return numbers as nested lists."""
+    """Return rounded numbers as nested lists; adding 0.0 turns -0.0 into 0.0."""
     return np.vectorize(lambda x: round(float(x), digits) + 0.0, otypes=[float])(values).tolist()
 
 
 def _words(values: Iterable[float]) -> str:
+    """Numbers as the text of an XML attribute."""
     return " ".join(_number(x, 12) for x in values)
 
 

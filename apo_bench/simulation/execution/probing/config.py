@@ -1,4 +1,4 @@
-"""How a robot probes: its actions, its sensor, and the calibration estimate from which it starts."""
+"""The settings of probing: actions, sensor, expected slip, and the calibration estimate that touches update."""
 
 from dataclasses import dataclass
 from typing import Protocol, final
@@ -8,8 +8,11 @@ from apo_bench.geometry import Array
 from apo_bench.records import USUAL_FT_SENSOR
 
 PROBING_ACTIONS = ("square", "touch", "lay", "search")
-"""Parts are squared before they are taken, what is fixed is touched, what is inserted is laid flat first (and touches a
-wall, if it comes from above), and what is stopped all the same is searched for."""
+"""All probing actions.
+
+`square`: square parts before the pick. `touch`: touch fixed parts with the hand. `lay`: lay parts flat before their
+insertion; from above, they then also touch a wall. `search`: search for the hole if an insertion is stopped.
+"""
 
 
 class CalibrationEstimate(Protocol):
@@ -17,51 +20,66 @@ class CalibrationEstimate(Protocol):
 
     @property
     def hand_eye(self) -> Array:
-        """Where the robot goes, (4, 4), for the frame that it takes for the world."""
+        """Estimated hand-eye error E, (4, 4): the robot goes to E T for a pose T in the world."""
 
     @property
     def tool(self) -> Array:
-        """How far the tip is off on the hand, (3,), in its own frame, [m]."""
+        """Estimated offset of the tip on the hand, (3,), in the frame of the tip, [m]."""
 
     @property
     def encoders(self) -> Array:
-        """How far each joint is off what its encoder says, (joints,), [rad]."""
+        """Estimated true minus measured joint angles, (joints,), [rad]."""
 
     @property
     def found(self) -> ProbingResult:
-        """What has been found out."""
+        """The estimates and their uncertainties, for the result of a replay."""
 
     def grasp(self, number: int, sigmas: Array) -> "CalibrationEstimate":
-        """A part was grasped, which may have moved in the hand by so much, (6,), [m, rad]."""
+        """Return the estimate with a further held part, whose pose in the hand is uncertain.
+
+        Args:
+            number: Identifies the grasp: the operation.
+            sigmas: Standard deviations of this pose, (6,), [m, rad].
+        """
 
     def touch(self, *touches: Touch) -> "CalibrationEstimate":
-        """Learn from touches."""
+        """Return the estimate updated by touches."""
 
     def real(self, T_world_tip: Array, jacobian: Array | None) -> Array:
-        """Where the tip really is, (4, 4)."""
+        """Return the estimated pose of the real tip, (4, 4).
+
+        Args:
+            T_world_tip: Pose that a robot without errors would have, (4, 4).
+            jacobian: Body Jacobian of the tip there, (6, joints); None: joint errors are left out.
+        """
 
     def command(self, T_world_tip: Array, jacobian: Array | None) -> Array:
-        """The inverse of `real`."""
+        """Return the pose to command, (4, 4), so that the real tip comes to `T_world_tip`: the inverse of `real`."""
 
     def covariance_of(self, T_world_tip: Array, jacobian: Array | None) -> Array:
-        """How uncertain is where the tip really is, (6, 6), of its body twist."""
+        """Return the covariance of the pose of the real tip, (6, 6), as a body twist, [m, rad]."""
 
     def held(self, grasp: int, T_tip_part: Array) -> Array:
-        """Where a part lies in the frame of the tip, (4, 4)."""
+        """Return the estimated pose of a held part in the frame of the tip, (4, 4).
+
+        Args:
+            grasp: As `number` of `grasp`.
+            T_tip_part: The pose estimated when the part was grasped, (4, 4).
+        """
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ProbingConfig:
-    """How a robot probes what is fixed to estimate its own errors."""
+    """How a robot probes surfaces to estimate its own errors."""
 
     estimate: CalibrationEstimate
-    """Before anything is touched."""
+    """The calibration estimate before any touch."""
     slip: Array
-    """(6,): how far a part may slip in the hand, standard deviations of a twist in the frame of the tip, [m, rad]."""
+    """Standard deviations of the slip in the hand, (6,), of a twist in the frame of the tip, [m, rad]."""
     seed: tuple[int, ...]
-    """Of the noise of its sensor."""
+    """Seed of the sensor noise."""
     ft_sensor: str = USUAL_FT_SENSOR
-    """The sensor at its wrist, as in `parse_ft_noise`."""
+    """The sensor at the wrist, as in `parse_ft_noise`."""
     actions: tuple[str, ...] = PROBING_ACTIONS
-    """Of `PROBING_ACTIONS`."""
+    """The actions in use, of `PROBING_ACTIONS`."""

@@ -1,6 +1,6 @@
-"""Places where the closed, empty hand can touch what is fixed.
+"""Find places where the closed, empty hand can touch the floor and walls of fixed parts.
 
-Known from the plan alone: estimated poses of what stands, and shapes.
+They follow from the plan alone: estimated poses and shapes of the parts.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,55 +20,60 @@ from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, translate
 from apo_bench.simulation.scene import Scene
 
 OPENING_M = 0.004
-"""Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
+"""Opening of each finger during touches: nearly closed, but the pads do not push on each other."""
 ROOM_M = 0.003
-"""Everything else stays so far away."""
-_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)  # of the rings around the goals on which the floor is touched
-_ANGLES = 24  # places of a ring
+"""Distance to all other parts."""
+_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)  # radii of the rings of floor places, in the order of preference
+_ANGLES = 24  # number of places on a ring
 _PATCH_M = 0.025
-"""The hand touches a floor that is whole so far around."""
+"""Radius around a place within which the floor must have no edge or hole."""
 _SLACK = 3
-"""Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
-_END_M = 1e-4  # shapes that end within this of the farthest end touch
+"""Greatest deviation of floor places from a third of a turn apart, in steps of the ring."""
+_END_M = 1e-4  # boxes that end within this distance of the farthest end touch too
 _OVER_M = 0.003
-"""A wall is touched so high over its foot, with the lowest part of the fingers."""
-_LIFT_M = 0.12  # the hand comes straight down from so far above
-_CHECKED_M = 0.004  # its room is checked at places this far apart
+"""Height over the foot of a wall at which the lowest part of the fingers touches it."""
+_LIFT_M = 0.12  # height from which the hand comes straight down
+_CHECKED_M = 0.004  # spacing of the places checked on this way
 
 
 StandOff = Callable[[Array, Array], float]
-"""How far before a face a touch begins, [m], by the pose of the tip there, (4, 4), and the normal of the face."""
+"""Pose of the tip at a touch, (4, 4), and normal of the face, (3,) -> distance before the face at which the touch
+begins, [m]."""
 
 
 class TouchPlace(NamedTuple):
-    """One guarded motion of the empty hand, and what it will touch."""
+    """One guarded motion of the empty hand, and the plane that it will touch."""
 
     T_world_tip: Array
-    """Where the motion begins, (4, 4), [m]."""
+    """Tip pose at which the motion begins, (4, 4)."""
     direction: Array
-    """Unit vector, (3,), world: into the face."""
+    """Direction of the motion, into the face: unit vector, (3,), world."""
     patch: Array
-    """Corners of what touches, (k, 3), in the frame of the tip, [m]: of a hand that is tilted one of them does."""
+    """Corners of the hand's touching area, (k, 3), in the frame of the tip, [m]; a tilted hand touches with one."""
     normal: Array
-    """Of the face, outwards, (3,), world."""
+    """Unit normal of the face, outwards, (3,), world."""
     offset: float
-    """normal . x = offset on it, [m]."""
+    """The plane of the face is normal . x = offset, [m]."""
     stand_off: float
-    """So far before the face the motion begins, [m]."""
+    """Distance before the face at which the motion begins, [m]."""
 
 
 def usual_stand_off(T_world_tip: Array, normal: Array) -> float:
-    """That of a robot that is nearly right."""
+    """Return the distance for a robot with small errors."""
     return STAND_OFF_M
 
 
 def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
-    """Up to three places of what carries everything, around the goals; none where the hand has no room."""
+    """Return up to three places on the largest upward fixed face, on a ring around the goals.
+
+    Places without room for the hand are left out; the first ring with three places is used.
+    """
     found = _floor(plan)
     if found is None:
         return ()
     part, face = found
     T = plan.start[part]
+    # The plane of the floor: n . x = d, world.
     n = T[:3, :3] @ face.normal
     d = float(n @ (T[:3, :3] @ face.outline[0] + T[:3, 3]))
     around = list_obstacles(plan.assembly.solids, plan.start, (part,))
@@ -79,6 +84,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
     to_face = pose.inverse(T @ make_plane_frame(face))
 
     def at(radius: float, k: int) -> TouchPlace | None:
+        """Return the k-th place of a ring, None if the floor ends nearby or the hand has no room."""
         angle = 2.0 * np.pi * (k % _ANGLES) / _ANGLES
         x, y = middle + radius * np.array([np.cos(angle), np.sin(angle)])
         touched = np.array([x, y, (d - n[0] * x - n[1] * y) / n[2]])
@@ -95,6 +101,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
         for first in free:
             three = [free[first]]
             for third in (_ANGLES // 3, 2 * _ANGLES // 3):
+                # The free place nearest to the exact third of a turn, if there is one.
                 near = sorted(range(-_SLACK, _SLACK + 1), key=abs)
                 three += [free[k] for s in near if (k := (first + third + s) % _ANGLES) in free][:1]
             best = max(best, three, key=len)
@@ -104,7 +111,10 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
 
 
 def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
-    """One place on each wall of what is fixed that locates a later fit."""
+    """Return one place on each wall from `upright_walls`, if the hand has room.
+
+    The hand touches with the side along its y axis, in which the fingers are stiff.
+    """
     ahead = np.array([0.0, 1.0])
     around = list_obstacles(plan.assembly.solids, plan.start, ())
     places = [
@@ -115,9 +125,10 @@ def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off)
 
 
 def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
-    """One wall touched by either side of the fingers along which they close, the hand turned by half; none without.
+    """Return two places on one wall, touched by opposite sides of the hand along the closing direction, or none.
 
-    There the fingers give way, on both sides: only the difference of the two is used.
+    The hand is turned by a half turn between them. The fingers give way along this direction, so only the difference of
+    both touches is used.
     """
     around = list_obstacles(plan.assembly.solids, plan.start, ())
     for part, face in upright_walls(plan.assembly, plan.start):
@@ -133,7 +144,7 @@ def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_
 
 
 def _floor(plan: Plan) -> tuple[str, Face] | None:
-    """The largest fixed face that looks up."""
+    """Return part and face of the largest fixed face that points up, None if there is none."""
     up = [
         (part, face)
         for part in sorted(plan.assembly.fixed)
@@ -146,7 +157,10 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
 def _with_room(
     scene: Scene, around: Sequence[Obstacle], face: Face, T: Array, ahead: Array, stand_off: StandOff
 ) -> TouchPlace | None:
-    """The middle of a wall, from as far as wanted, else from as near as is usual; None where there is no room."""
+    """Return a place in the middle of a wall, None if the hand has no room.
+
+    The motion begins at the wanted distance, or else at the usual one.
+    """
     for way_off in dict.fromkeys((stand_off, usual_stand_off)):
         place = _at_wall(scene, face, T, ahead, way_off)
         if _free(scene, place.T_world_tip, around):
@@ -155,29 +169,33 @@ def _with_room(
 
 
 def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandOff) -> TouchPlace:
-    """The middle of a wall, touched low by a side of the fingers.
+    """Return a place in the middle of a wall, near its foot, touched by a side of the fingers.
 
     Args:
-        ahead: The side, a direction of the tip, (2,): x or y, up to its sign.
+        T: Pose of the part with the wall, (4, 4), world.
+        ahead: Outward direction of this side in the x-y plane of the tip, (2,): along x or y, of either sign.
+        stand_off: Gives the distance at which the motion begins.
     """
     n = T[:3, :3] @ face.normal
     corners = face.outline @ T[:3, :3].T + T[:3, 3]
     low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
     d = float(n @ corners[0]) - (1e-3 * scene.clearance_mm if face.fit else 0.0)
-    into = n[2] * UP - n
+    into = n[2] * UP - n  # level direction into the wall
     into /= np.linalg.norm(into)
-    # Looking down, y = z x x = -up x x: of the way into the wall, ahead is what it is in the frame of the tip.
+    # The tip looks down, so y = z x x = -up x x. The tip is turned so that `ahead` points into the wall.
     x = ahead[0] * into + ahead[1] * np.cross(into, -UP)
     R = np.column_stack([x, np.cross(-UP, x), -UP])
     boxes = _boxes(scene)
     reach = float(_lowest(boxes)[0, 2])
     ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
     sides = [float(ahead @ box.center[:2] + np.abs(ahead) @ box.half[:2]) for box in ends]
+    # The boxes that touch, and their extent across `ahead`.
     those = [box for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M]
     across = np.abs(ahead[::-1])
     low_across = min(float(across @ (box.center - box.half)[:2]) for box in those)
     high_across = max(float(across @ (box.center + box.half)[:2]) for box in those)
     foot = low + min(_OVER_M, (high - low) / 2)
+    # Height over which the side of the fingers and the wall overlap.
     common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))
     level = [max(sides) * ahead + reach_across * across for reach_across in (low_across, high_across)]
     patch = np.array([(*xy, z) for xy in level for z in (reach - common, reach)])
@@ -189,11 +207,12 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
+    """Return the boxes of the gripper at the opening for touches, in the frame of the tip."""
     return list_gripper_boxes(scene.kinematics, OPENING_M)
 
 
 def _lowest(boxes: Sequence[Box]) -> Array:
-    """The corners of what reaches farthest ahead, (4, 3), in the frame of the tip."""
+    """Return the corners of the end face of the fingers, (4, 3), in the frame of the tip, [m]: farthest along z."""
     reach = max(float(box.center[2] + box.half[2]) for box in boxes)
     ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
     low = np.min([box.center - box.half for box in ends], axis=0)
@@ -202,7 +221,7 @@ def _lowest(boxes: Sequence[Box]) -> Array:
 
 
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
-    """Whether the hand can come straight down to a pose that the arm reaches."""
+    """Whether the hand has room straight down to a tip pose T, and the arm reaches both ends of this way."""
     lifts = np.arange(0.0, _LIFT_M, _CHECKED_M)[:, None] * UP
     if gripper_depth(scene.kinematics, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False

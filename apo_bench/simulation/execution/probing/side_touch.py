@@ -1,4 +1,4 @@
-"""Touch a fixed wall with the side of a held part, before it is inserted from above."""
+"""Touch a fixed wall with the side of a held part before its insertion from above, to measure its pose in the hand."""
 
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.probing.state import ProbingState
@@ -26,13 +26,18 @@ _DOWN = 0.2
 def touch_side(
     robot: Robot, probing: ProbingState, operation: int, t: Transfer, place: SideTouch, grip: Grip, held: Array
 ) -> Grip:
-    """Go there, press, come back; returns how the part is known to be held now.
+    """Carry the part to a side touch, press it on the wall and come back.
 
     Args:
-        held: Where it was estimated in the frame of the tip when it was taken, (4, 4).
+        place: The touch, from `find_side_touches`.
+        grip: The present grip.
+        held: Pose of the part in the frame of the tip as estimated at the pick, (4, 4).
+
+    Returns:
+        The updated grip; without contact the estimate stays as it was.
 
     Raises:
-        ExecutionAborted: It fell out of the hand, or something was struck.
+        ExecutionAborted: The part fell out of the hand, or the arm collided.
     """
     T = place.T @ grip.T_part_tip
     high = max(t.safe, float(T[2, 3]))
@@ -42,7 +47,7 @@ def touch_side(
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
     touches = []
-    # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
+    # Sleeping is off, so that a collision with a part at rest is noticed.
     with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
         probing.wrist.hold(*compute_part_loads(robot.scene, {t.part: held}))
         end = translate(robot.T, place.direction, 2.0 * STAND_OFF_M + BEYOND_M)

@@ -1,4 +1,4 @@
-"""Touch what is fixed with the closed, empty hand: the floor around the goals, then walls."""
+"""Probe fixed parts with the closed, empty hand, first the floor, then walls, to calibrate the robot."""
 
 from functools import partial
 
@@ -31,23 +31,25 @@ from apo_bench.simulation.robot import (
 from apo_bench.simulation.scene import allow_sleep
 
 SPEED = 0.0025
-"""Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
+"""Steady speed of a touch, [m/s]; at four times this speed a stiff hand exceeds the collision limit."""
 BEYOND_M = 0.001
-"""The floor or a wall may be so much farther than expected."""
+"""Further travel of a touch beyond twice its stand-off."""
 _DOWN = 0.4  # peak speed [m/s] of the empty hand down to a place
 _OVER = 0.8  # as `_DOWN`, over the parts
 _BACK = 0.3  # as `_DOWN`, back from a touch
 _HALF_TURN = 3.0
-"""A hand that turns by more passes by its rest, [rad]: the shorter way may lead over where the wrist ends."""
+"""Turn, [rad], from which the hand passes by its rest pose, since the shorter turn may reach the end of the wrist."""
 _HIGH_M = 0.1
-"""The hand passes from one place to the next so far above them."""
+"""Height over the places at which the hand passes from one to the next."""
 
 
 def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
-    """Touch the floor, then walls; the robot updates its calibration estimate after each.
+    """Tare the wrist sensor and, with the action `touch`, touch the floor, then walls.
+
+    The calibration estimate is updated after the floor, after the walls, and after the two opposite touches.
 
     Raises:
-        ExecutionAborted: The hand struck something, or a place is out of reach.
+        ExecutionAborted: The hand collided, or a place is out of reach.
     """
     robot.stage = TOUCHING
     probing.begin(robot)
@@ -55,6 +57,7 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
         return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
+        # Found with the present estimate, whose uncertainty sets how far before a face a touch begins.
         those = places(probing.plan, robot.scene, partial(_stand_off, robot, probing))
         touches = list[tuple[Touch, Array]]()
         for place in those:
@@ -67,11 +70,12 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
 
 
 def _stand_off(robot: Robot, probing: ProbingState, T: Array, normal: Array) -> float:
+    """Return how far before a face a touch begins, [m]: at least the greatest assumed error of the tip."""
     return max(STAND_OFF_M, probing.off_m(robot, T, normal))
 
 
 def _room(robot: Robot, probing: ProbingState, place: TouchPlace) -> str:
-    """What to say where something was struck: nothing if the robot had room for what it may be off."""
+    """Return the likely cause of a collision, as a phrase; empty if the room exceeds the assumed error of the tip."""
     far = max(probing.off_m(robot, place.T_world_tip, direction) for direction in np.eye(3))
     if far <= ROOM_M:
         return ""
@@ -80,7 +84,12 @@ def _room(robot: Robot, probing: ProbingState, place: TouchPlace) -> str:
 
 
 def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple[Touch, Array]]:
-    """Go there, press, come back; the touch, if there was one, and what of the hand may have touched."""
+    """Move to a place, press and come back.
+
+    Returns:
+        The touch and the patch of the hand that touched, as a list of one; empty without contact.
+    """
+    # The commands compensate for the estimate, so the hand goes where only the remaining errors lead it.
     T = probing.residual.hand_eye @ place.T_world_tip @ probing.residual.tool
     direction = probing.residual.hand_eye[:3, :3] @ place.direction
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
@@ -91,7 +100,7 @@ def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple
     robot.go(move_to_height(T, high), _OVER)
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
-    # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
+    # Sleeping is off, so that a collision with a part at rest is noticed.
     with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
         end = translate(robot.T, direction, 2.0 * place.stand_off + BEYOND_M)
         left = press(robot, plan_steady_trajectory(robot.T, end, SPEED), direction, probing.touch_n, probing.wrist)
