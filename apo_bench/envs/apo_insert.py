@@ -296,8 +296,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         before = self._best
         shared = 0.0
         try:
-            # the third axis of the reading leads in, so its negative is the distance left
             self._move(control, given)
+            # the third axis of the reading leads in, so its negative is the distance left
             self._best = min(before, -float(control.reading.tip[2]))
             # progress as a share of the whole distance; going beyond the target earns nothing more
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins

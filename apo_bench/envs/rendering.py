@@ -12,9 +12,8 @@ MODES = ("rgb_array", "rgb_array_list", "human")
 FPS = 25  # frames per second of a film
 FILM_SPEED = 4.0
 """Playback speed of a film relative to the replay."""
-_PICTURE = (640, 480)
+_PICTURE = (640, 480)  # width and height of an image, in pixels
 _SMALL = (320, 240)  # width and height of a frame of a film, in pixels
-"""Width and height of a picture, and of a frame of a film, in pixels."""
 
 
 @final

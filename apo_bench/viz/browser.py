@@ -102,8 +102,8 @@ class Page:
         with self._server.atomic():
             for kind, at in shapes_of(self.cursor.rollout.scene, self._data, snapshot):
                 handle = self._handle(kind, count[kind])
-                # viser orders position and quaternion as (x, y, z), (w, x, y, z)
                 count[kind] += 1
+                # viser orders position and quaternion as (x, y, z), (w, x, y, z)
                 if not np.array_equal(at, (*handle.position, *handle.wxyz)):
                     handle.position = at[:3]
                     handle.wxyz = at[3:]

@@ -128,9 +128,9 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
 
 
 def _cells(line: PlanLine) -> tuple[str, ...]:
+    # main part, and the parts that it carries
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
     macros = []
-    # main part, and the parts that it carries
     for macro in line.macros:
         length = "" if macro.length_m is None else f" {1e3 * macro.length_m:.4g} mm"
         macros.append(f"{macro.name} {format_direction(macro.direction)}{length}")

@@ -36,8 +36,8 @@ _OF_ROW = MappingProxyType(  # columns of a trial record that the table of episo
         "config_hash": "of everything that this trial depends on",
     }
 )
-_POSES = "(x, y, z, qw, qx, qy, qz), world frame, m"
-OF_EPISODE: Mapping[str, str] = MappingProxyType(  # pieces of text that state the layout of a pose
+_POSES = "(x, y, z, qw, qx, qy, qz), world frame, m"  # layout of a pose, for the meanings below
+OF_EPISODE: Mapping[str, str] = MappingProxyType(
     {
         **_OF_ROW,
         "parts": "names of the parts that can move, in the order of the frames",

@@ -27,8 +27,8 @@ from apo_bench.trial.stages import scene_of
 _FRAME = "way in"  # the frame of the insertion axis
 
 
-# names of the numbers of twists
 def _named(*kinds: str) -> tuple[str, ...]:
+    """Return the names of the six numbers of each kind of twist."""
     return tuple(f"{kind}_{axis}" for kind in kinds for axis in ("x", "y", "z", "rx", "ry", "rz"))
 
 

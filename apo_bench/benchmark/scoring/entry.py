@@ -27,8 +27,8 @@ _TOLERANCE = 1e-6
 """Percentage points by which a score may differ, since processors round differently."""
 
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
-# a hash of 16 hexadecimal digits
 Text = Annotated[str, Meta(max_length=4000)]
+# a hash of 16 hexadecimal digits
 Hash = Annotated[str, Meta(pattern=r"^[0-9a-f]{16}\Z")]
 # the trials of a condition, one letter each
 Trials = Annotated[str, Meta(pattern=rf"^[{RIGHT}{WRONG}{EXCLUDED}]+\Z")]
