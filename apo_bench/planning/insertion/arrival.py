@@ -155,6 +155,7 @@ def arrive(
 
         def length(u: Array) -> float:
             # Round walls may end farther out than the solids around the part require.
+            """Exit distance along `u`, [m]."""
             ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
             return max(compute_exit_distance(moving, u, around), *ends)
 
