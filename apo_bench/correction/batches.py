@@ -1,6 +1,4 @@
-"""Correction of many observations of one assembly in batches, which share the work that depends on the assembly
-alone.
-"""
+"""Correction of many observations of one assembly in batches, which are faster than one observation at a time."""
 
 from collections.abc import Sequence
 from math import ceil

@@ -90,7 +90,8 @@ def _name_of(corrector: Any, chosen: Any) -> str:
 def _admit(returned: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """Convert what a corrector returned to a valid `Correction`.
 
-    Results of correctors from outside the package are checked, and their gaps are measured, not believed.
+    Results of correctors from outside the package are checked, and the gaps that they state are replaced by measured
+    ones.
 
     Args:
         observation: The observation with round faces projected.
@@ -126,9 +127,7 @@ def _is_ours(corrector: Any) -> bool:
 
 
 def _checked_poses(returned: Any, n: int, name: str) -> Array:
-    """Convert what a corrector returned to poses, (n, 4, 4), of a rigid shape; rows that are not finite are let
-    through.
-    """
+    """Convert what a corrector returned to rigid poses, (n, 4, 4); poses that are not finite are let through."""
     try:
         poses = copy_real(returned)
     except ArgumentError as error:

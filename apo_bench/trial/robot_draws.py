@@ -45,7 +45,7 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     """
     resting = plan.start
     states = list[Poses]()
-    for move in plan_moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral, ()):
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]

@@ -93,7 +93,7 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
     """Return the first clear grasp that closes along the level component of a direction, or None.
 
-    It is clear open and closed, since fingers that close flush with a wall beside the part jam against it.
+    It is clear open and closed, since fingers that close flush with a wall next to the part jam against it.
 
     Args:
         across: Direction in the frame of the part, (3,); its sign does not matter.
@@ -113,12 +113,14 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
-    """The grasp for a stroke; if none is clear all the way, however little, one to begin and one to end with.
+    """Return one grasp that is clear along a whole stroke, else two with a change of grip on the way.
 
-    Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
+    Of two, each is clear with closed fingers on its part of the stroke, and both with open fingers at the change. The
+    preferred grasp is tried first, and returned if nothing is clear.
 
     Args:
-        places: Where else the part is picked up or put down, clear for the grasp that is used there.
+        places: Further places at which the part is picked up or put down, before the stroke.
+        stroke: A straight motion to the goal; the part can also be pulled out backwards along it.
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
     solid = scene.scenario.assembly.solids[part]
@@ -159,8 +161,8 @@ def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """Return half the width of the part between the fingers, [m].
 
-    This is half the extent of the whole part if it consists of boxes and the fingers hold its full width, or if the
-    width at the grasp cannot be measured.
+    For a part of boxes whose full width the fingers hold, this is half the extent of the part. The same extent is used
+    if the width at the grasp cannot be measured.
 
     Args:
         T: Pose of the part, (4, 4), from which a grasp without `ahead` has its vertical.

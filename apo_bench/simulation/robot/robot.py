@@ -48,8 +48,8 @@ class ExecutionAborted(Exception):
     Attributes:
         stage: What the robot did: `pick`, `carry`, `attach` and so on.
         code: What went wrong, a failure code.
-        part: Which part it is about, if not the one that is moved.
-        why: What is known of the cause.
+        part: The part concerned; empty if it is the moved one.
+        why: A phrase about the likely cause; empty if it is unknown.
     """
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
@@ -61,7 +61,7 @@ class ExecutionAborted(Exception):
 
 
 class Robot:
-    """One arm during one replay."""
+    """The controller of one arm during one replay, with the simulation that it moves in."""
 
     def __init__(
         self,

@@ -113,7 +113,7 @@ class TipControl:
             turn: Rotation vector about the front, (3,), in the same frame, [rad].
 
         Raises:
-            ExecutionAborted: Something was struck, or fell out of the hand.
+            ExecutionAborted: The arm collided, or the part fell out of the hand.
         """
         with self._stepping():
             self._move(shift, turn)
