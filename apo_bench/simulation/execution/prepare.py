@@ -58,7 +58,7 @@ class Move(NamedTuple):
 
 
 @remember
-def plan_moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
+def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...]) -> tuple[Move, ...]:
     """Return the move of each step of the schedule.
 
     Cached, since both the plan check and the execution need the moves.
@@ -114,7 +114,7 @@ def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False, ()))
 
 
 def _transfer(

@@ -34,7 +34,7 @@ _CHECKED_M = 0.004  # spacing of the places checked on the way down
 
 
 class SideTouch(NamedTuple):
-    """One touch of a wall with the side of a part."""
+    """One guarded motion of a held part, and the point and wall that touch at its end."""
 
     T: Array
     """Pose of the part when the motion begins, (4, 4), world."""

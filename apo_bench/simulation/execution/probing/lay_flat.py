@@ -56,7 +56,7 @@ def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, g
         The updated grip; the same if the sensor is too noisy.
 
     Raises:
-        ExecutionAborted: It fell out of the hand, or something was struck.
+        ExecutionAborted: The part fell out of the hand, or the arm collided.
     """
     if averaged_s(t.flat, probing.wrist.sigma) > LONGEST_S:
         return grip
@@ -123,7 +123,7 @@ class _Laying:
         self._turning = np.full(3, _TURN_RAD)  # averaged angular speed, at first above the limit
         self._push = 0.0  # averaged push, [N]
         self._calm = 0
-        self._left = round(MOST_S / READING_S)
+        self._left = round(MOST_S / READING_S)  # readings until the time limit
         self.lies = False
 
     def __call__(self, wrench: Array) -> Array | None:

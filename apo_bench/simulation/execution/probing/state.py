@@ -1,8 +1,8 @@
 """The calibration that a robot estimates by probing during one replay, and the commands that compensate for it.
 
-The robot knows its commands, its encoders, the opening of the gripper, the wrench at its wrist, the plan, the part
-files and the estimated poses of fixed parts. The drawn errors move the hand away from where the robot expects it, as in
-every replay. `estimated_tip` removes them again, since it returns the pose that the encoders show.
+The robot knows its commands, its encoders, the opening of the gripper and the wrench at its wrist. It also knows the
+plan, the part files and the estimated poses of fixed parts. The drawn errors move the hand away from where the robot
+expects it, as in every replay. `estimated_tip` removes them again, since it returns the pose that the encoders show.
 """
 
 from collections.abc import Sequence
