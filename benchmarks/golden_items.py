@@ -44,30 +44,12 @@ KEYS = {
 }
 """Attributes, columns of records, keys of observations and of `info`."""
 DROPPED = {
-    *(
-        "schema",
-        "env_id",
-        "config_hash",
-        "scenario",
-        "noise_level",
-        "noise_mm",
-        "noise_deg",
-        "human_error_scale",
-        "clearance_mm",
-    ),
+    *("schema", "env_id", "config_hash", "scenario", "noise_level", "noise_mm", "noise_deg", "human_error_scale"),
+    "clearance_mm",
     *("pose_source", "noise", "grasp", "arm", "robot_error", "contact_source", "method", "max_reobservations"),
     *("ft_sensor", "assumed_robot_error", "min_predicted_success", "seed", "secret_seed", "timestep_s", "fidelity"),
-    *(
-        "human_error_covariance",
-        "level",
-        "sentence",
-        "joint_control",
-        "why",
-        "trace",
-        "assembly",
-        "assumed",
-        "believed",
-    ),
+    *("human_error_covariance", "level", "sentence", "joint_control", "why", "trace", "assembly"),
+    *("assumed", "believed"),
 }
 """Not kept of what the package returns, by neutral names: settings, texts, provenance, iterations of solvers."""
 

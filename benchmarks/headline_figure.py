@@ -33,7 +33,10 @@ STYLES = {
 OUTLIERS = ("uncorrected", "paper", "contact", "contact-robust")
 FONT = 12.0
 NAME_HEIGHT = 5.5  # of a name next to a line, in percent of the axis
-APART = 2.4  # coinciding lines are drawn this far from each other, in percent of the axis
+THIN, WIDER = (
+    1.6,
+    2.4,
+)  # width of a line, and how much wider it is for every later line that coincides with it, in points
 
 
 def draw_summary(summary: Summary, path: Path) -> None:
@@ -160,18 +163,17 @@ def size_mm(error: str) -> float:
 def draw_lines(axis: Any, lines: Mapping[str, Sequence[tuple[int, Rate]]]) -> None:
     """Draw a line with the band of its 95 % intervals for each method, and its name where it ends.
 
-    Lines that coincide are drawn `APART`.
+    Lines that coincide lie on each other, the thinner on the wider, at their true heights.
     """
-    shown: dict[str, dict[int, float]] = {method: {} for method in lines}
-    for k in sorted({k for drawn in lines.values() for k, _ in drawn}):
-        here = sorted((percent(rate), method) for method, drawn in lines.items() for at, rate in drawn if at == k)
-        for height, (_, method) in zip(spread([value for value, _ in here], APART), here, strict=True):
-            shown[method][k] = height
-    ends = sorted((max(heights), heights[max(heights)], method) for method, heights in shown.items())
-    for method, drawn in lines.items():
+    ends = sorted((drawn[-1][0], percent(drawn[-1][1]), method) for method, drawn in lines.items())
+    methods = list(lines)
+    for k, (method, drawn) in enumerate(lines.items()):
         color, marker, dashes = STYLES[method]
-        at = list(shown[method])
-        axis.plot(at, list(shown[method].values()), color=color, marker=marker, linestyle=dashes, clip_on=False)
+        at = [each for each, _ in drawn]
+        heights = [percent(rate) for _, rate in drawn]
+        above = sum(_coincide(drawn, lines[other]) for other in methods[k + 1 :])
+        style = {"linewidth": THIN + WIDER * above, "linestyle": "-" if above else dashes}
+        axis.plot(at, heights, color=color, marker=marker, markersize=6 + 2.5 * above, clip_on=False, **style)
         low, high = ([100 * getattr(rate.interval, side) for _, rate in drawn] for side in ("low", "high"))
         axis.fill_between(at, low, high, color=color, alpha=0.10, linewidth=0)
     for last in {k for k, _, _ in ends}:
@@ -186,6 +188,12 @@ def draw_lines(axis: Any, lines: Mapping[str, Sequence[tuple[int, Rate]]]) -> No
     axis.grid(axis="y", color=RULE)
     axis.tick_params(length=0)
     axis.spines[["top", "right"]].set_visible(False)
+
+
+def _coincide(drawn: Sequence[tuple[int, Rate]], other: Sequence[tuple[int, Rate]]) -> bool:
+    """Return whether two lines share at least two points, to 1.5 percent."""
+    heights = {k: percent(rate) for k, rate in other}
+    return sum(abs(percent(rate) - heights.get(k, np.inf)) < 1.5 for k, rate in drawn) >= 2
 
 
 def percent(rate: Rate) -> float:

@@ -1,4 +1,4 @@
-"""The topology of an assembly, and the poses that flow over it, in the words of the paper. No solver, no simulator."""
+"""Data model of an assembly: topology, poses, observations, plans and corrections, in the terms of the paper."""
 
 from apo_bench.assembly.contact_kinds import ContactKind, classify_contact, compute_geometric_play, compute_play_mm
 from apo_bench.assembly.correction_record import (

@@ -1,4 +1,4 @@
-"""What kind of contact two faces make, and how much play their sizes leave."""
+"""Kind of contact that two faces can make, and the play that their sizes leave."""
 
 from typing import Literal
 
@@ -6,11 +6,11 @@ from apo_bench.geometry import Face, RoundFace
 
 ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
 OPPOSING = -0.9
-"""Largest cosine between the normals of two faces that look at each other: contacts leave tilts of a few degrees."""
+"""Largest cosine between the normals of two faces that oppose: contacts leave tilts of a few degrees."""
 WALLS = 8
-"""Planes through an axis that stand for the disc of a round fit: sixteen walls, whose corners lie on its circle."""
+"""Number of planes through an axis that bound the play of a shaft: sixteen walls, whose corners lie on its circle."""
 _SAME_SLOPE = 2e-3
-"""A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
+"""Largest difference of the slopes of two cones that fit into each other, about 0.1 degrees."""
 
 
 def classify_contact(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
@@ -32,19 +32,17 @@ def classify_contact(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | 
 
 
 def compute_geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
-    """By how much the radius of a hole is larger than that of its shaft, [m]; 0 of every other contact.
-
-    Negative where the shaft is thicker than the hole.
-    """
+    """Radius of a hole minus that of its shaft, [m], negative where the shaft is thicker; 0 for every other contact."""
     if isinstance(a, Face) or isinstance(b, Face) or classify_contact(a, b) != "shaft in hole":
         return 0.0
     return a.radius - b.radius if a.hole else b.radius - a.radius
 
 
 def compute_play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
-    """How far faces that go into one another may be off, [mm]: the clearance if one is fit, and what radii leave.
+    """How far two fit faces may be off, [mm]: the clearance if one is fit, plus the difference of radii of a shaft in a
+    hole.
 
-    None of faces that only touch.
+    None for faces that only touch.
     """
     fits = a.fit or b.fit
     if not fits and classify_contact(a, b) != "shaft in hole":

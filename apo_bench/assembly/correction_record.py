@@ -1,4 +1,4 @@
-"""What a corrector returns: poses, how the solver ended, and the result of the test of the correction."""
+"""Result of a corrector: poses, how the solver ended, and the chi-square test of the correction."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -15,16 +15,17 @@ from apo_bench.geometry import Array, freeze, make_copyable
 
 
 class Iterate(NamedTuple):
-    """One iteration of a solver, kept for the reader and the plots."""
+    """One iteration of a solver, for reports and plots."""
 
     gap_m: float
-    """Largest |e| before the step, [m]. Of `contact` and `contact-robust` of the compact equations, three per contact,
-    which count sqrt(v) times at the centre of v vertices; so it may be larger than `Correction.gap_before_m`, the
-    largest |e| of vertices."""
+    """Largest |e| before the step, [m]. For `contact` and `contact-robust` it is that of the compact equations, three
+    per contact, which count sqrt(v) times at the centre of v vertices. So it may exceed `Correction.gap_before_m`,
+    the largest |e| of vertices."""
     rank: int
-    """Of the paper's solver, of the equations at this iteration; of `contact`, where it ended, in every iteration."""
+    """For the paper's solver, the rank of the equations at this iteration; for `contact`, the rank at the end, in every
+    one."""
     step: float
-    """Of the paper's solver, the length of the scaled step, [m]; of `contact`, its largest component, in standard
+    """For the paper's solver, the length of the scaled step, [m]; for `contact`, its largest component, in standard
     deviations."""
 
 
@@ -34,44 +35,46 @@ class FreeingTrial(NamedTuple):
     step: int
     """The operation that had just been observed, counted from 0."""
     free: tuple[int, ...]
-    """The operations whose motion parameters were free, most recent first."""
+    """The operations whose motion parameters were free, most recent first, counted from 0."""
     gap_m: float
     """Largest |e| over the equations of the trial, after solving."""
 
 
 class Suspect(NamedTuple):
-    """A relation, and how well everything else fits without it."""
+    """A relation, and the test of the correction without it."""
 
     relation: str
-    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts; or one of them."""
+    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts. Or one of its
+    contacts."""
     contacts: tuple[Contact, ...]
     made: int
     """The operation that made it, counted from 0."""
     chi_square: float
     """Squared Mahalanobis length of the correction when its equations are left out."""
     freedom: int
-    """Rank of the equations that are left."""
+    """Rank of the remaining equations."""
     p_value: float
 
 
 @final
 @dataclass(frozen=True)
 class Consistency:
-    """The chi-square test of a correction: is it larger than the stated noise explains?"""
+    """The chi-square test of a correction: whether the stated noise explains its length."""
 
     chi_square: float
-    """Squared Mahalanobis length of the correction, what is left of contradictory contacts added."""
+    """Squared Mahalanobis length of the correction, plus the residuals of contradictory contacts."""
     freedom: int
-    """Degrees of freedom of the chi-square distribution: the rank of the contact equations at the solution, which is
-    how many directions contacts fix, not how many they leave free."""
+    """Degrees of freedom of the chi-square distribution: the rank of the contact equations at the solution. That is the
+    number of directions that contacts fix, not the number they leave free."""
     p_value: float
     level: float
-    """The test fails if the p-value is below."""
+    """The test fails if the p-value is below this."""
     suspects: tuple[Suspect, ...] = ()
-    """Every relation, the most suspect first; looked for only if the test fails."""
+    """Every relation, the most suspect first; computed only if the test fails."""
 
     @property
     def passes(self) -> bool:
+        """Whether the stated noise explains the correction."""
         return self.p_value >= self.level
 
     @property
@@ -85,24 +88,24 @@ class Consistency:
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One explanation of the observation: what of it is taken as right, how likely that is, and its poses."""
+    """One explanation of the observation: what is assumed of it, its probability, and the poses that follow."""
 
     weight: float
-    """Probability; what all those of a correction leave to 1 is that of none of them."""
+    """Probability; the weights of a correction leave to 1 the probability that none of its hypotheses is right."""
     poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array | None
-    """(n, 6, 6), posterior, of the body twist by which each pose may still be wrong, [m, rad]; None if unknown."""
+    """(n, 6, 6), posterior, of the body twist of the error of each pose, [m, rad]; None if unknown."""
     assumed: Observation
-    """What the poses are the correction of."""
+    """The assumed observation, of which the poses are the correction."""
     left_out: tuple[int, ...] = ()
     """Operations whose observations are all rejected, counted from 0."""
     dropped: tuple[str, ...] = ()
     """Relations that are rejected."""
     sentence: str = ""
-    """What is assumed in place of what was stated, in words; empty if all is assumed as stated."""
+    """How the assumptions differ from what was stated, in words; empty if they do not."""
     noise_scale: float = 1.0
-    """How much larger than stated the noise is; `covariance` and `assumed` count it."""
+    """Assumed ratio of the actual noise to the stated noise; `covariance` and `assumed` include it."""
 
     def __post_init__(self) -> None:
         freeze(self, poses=(None, 4, 4), covariance=(len(self.poses), 6, 6))
@@ -189,14 +192,14 @@ class Correction:
 
 @runtime_checkable
 class Reobserver(Protocol):
-    """Observes operations again, counted from 0, when it is called with them; a corrector may be handed one.
+    """Callable that observes operations, counted from 0, again; correctors may be given one.
 
-    Each observation has its own errors, by the noise of the first, so it may be an outlier or a miss as well.
+    Each observation has its own errors, with the noise of the first, so it may be an outlier or a miss as well.
     """
 
     @property
     def left(self) -> int:
-        """Observations that are left."""
+        """Number of observations that are left."""
 
     def __call__(self, operations: Collection[int]) -> Observation:
         """Observe some operations once; all others are not `observed`.
@@ -208,10 +211,10 @@ class Reobserver(Protocol):
 
 @runtime_checkable
 class ReobservingCorrector(Protocol):
-    """A corrector that can observe again; one without this method is never handed a reobserver."""
+    """A corrector that can request further observations; correctors without its method never get a reobserver."""
 
     def __call__(self, observation: Observation) -> Correction:
-        """Correct an observation that cannot be looked at again."""
+        """Correct an observation without further observations."""
 
     def correct_and_reobserve(self, observation: Observation, reobserve: Reobserver) -> Correction:
-        """Correct an observation, observing again as often as is allowed and needed."""
+        """Correct an observation, observing operations again as often as needed and allowed."""

@@ -1,4 +1,6 @@
-"""What a human did, without measurement error: the true poses of a trial, before and after the human error."""
+"""True poses of a trial: the layout before any human error, and the demonstration after it, without measurement
+error.
+"""
 
 from dataclasses import dataclass
 from typing import final

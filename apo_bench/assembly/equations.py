@@ -32,9 +32,10 @@ class Equations:
     """m scalar equations in the motion parameters of n operations; the vertices stay as they are during a solve."""
 
     start: Array
-    """(p, 4, 4): the constant motion parameters."""
+    """(p, 4, 4): the constant motion parameters, the start poses of p parts."""
     letters: NDArray[np.intp]
-    """(c, w): the word D_a^-1 D_b of each contact; p start poses, then n poses, then the identity as padding."""
+    """(c, w): the word D_a^-1 D_b of each contact as indices: p start poses, then n poses, then the identity as
+    padding."""
     inverse: NDArray[np.bool_]
     """(c, w): which letters of the words are inverted."""
     made: NDArray[np.intp]
@@ -55,12 +56,12 @@ class Equations:
         return tuple(int(k) for k in occurring[::-1] if 0 <= k < n)
 
     def containing(self, free: Collection[int]) -> NDArray[np.bool_]:
-        """Whether the motion parameter of one of these operations occurs in the word of each contact, (c,)."""
+        """Whether the word of each contact contains a motion parameter of the `free` operations, (c,)."""
         wanted = np.array(sorted(free), dtype=np.intp) + len(self.start)
         return np.asarray(np.isin(self.letters, wanted).any(axis=1))
 
     def among(self, contacts: NDArray[np.bool_]) -> "Equations":
-        """The equations of these contacts, (c,), alone."""
+        """The equations of the chosen contacts, (c,), alone."""
         rows = contacts[self.contact]
         number = np.cumsum(contacts) - 1
         return Equations(
@@ -80,7 +81,7 @@ class Equations:
         return largest_of_each
 
     def residual(self, poses: Array) -> Array:
-        """e of every equation, (m,), [m]: positive where faces are apart, negative where they are inside each other."""
+        """e of every equation, (m,), [m]: positive where the faces are apart, negative where they penetrate."""
         return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(poses))[0])
 
     def linearise(self, poses: Array) -> tuple[Array, Array]:
@@ -103,9 +104,9 @@ class Equations:
         rows = np.concatenate([a, cross_rows(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
         J = np.zeros((m, n + 1, 6))
         k = self.letters - len(self.start)
-        # Constants, the starts and the padding, have a column of their own, n, which is thrown away.
+        # Constants, the starts and the padding, go to an extra column n, which is dropped at the end.
         columns = np.where((k >= 0) & (k < n), k, n)[self.contact]
-        # One letter after the other, since an operation that occurs twice in a word gets both of its rows.
+        # One letter at a time, since += counts a repeated index once: an operation may occur twice in a word.
         for j in range(w):
             J[np.arange(m), columns[:, j]] += rows[j]
         return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
@@ -116,24 +117,25 @@ class Equations:
         return np.where(self.inverse[..., None, None], pose.inverse(F), F)[self.contact]
 
     def _points(self, F: Array) -> list[Array]:
-        """F_j+1 .. F_w v for every j: the vertices on their way to the frame of the plane, [(m, 4)]."""
+        """F_j+1 .. F_w v for every j, the vertices transformed by the last letters: w + 1 arrays (m, 4)."""
         letters = reversed(F.swapaxes(0, 1))
         return list(accumulate(letters, lambda v, T: np.einsum("mij,mj->mi", T, v), initial=self.vertex))[::-1]
 
     def _forms(self, F: Array) -> list[Array]:
-        """n F_1 .. F_j for every j: the planes on their way to the frame of the vertices, [(m, 4)]."""
+        """n F_1 .. F_j for every j, the planes transformed by the first letters: w + 1 arrays (m, 4)."""
         letters = F.swapaxes(0, 1)
         return list(accumulate(letters, lambda n, T: np.einsum("mi,mij->mj", n, T), initial=self.plane))
 
 
 def build_contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
-    """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
+    """The equations of all contacts, present and lost, in the order of `assembly.relations()`.
 
-    Contacts of round faces are those of sheets (`project_round_faces`).
+    Contacts of round faces are replaced by those of sheets (`project_round_faces`).
 
-    The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `poses`: of
-    one face only, since both would raise the spurious singular values, and whole, since a lever as long as a table
-    turns a degree into centimetres and a clipped polygon changes with the noise.
+    The vertices are the corners of the smaller face of a pair, projected onto the plane of the other one at `poses`.
+    Only one face is used, since both would raise the spurious singular values. It is not clipped, since the clipped
+    polygon changes with the noise, nor is the larger face used: a lever as long as a table turns a degree into
+    centimetres.
 
     Args:
         poses: (n, 4, 4), where the vertices are taken, world frame, [m].
@@ -159,5 +161,5 @@ def measure_largest_gap(assembly: Assembly, start: Poses, poses: Array) -> float
 
 
 def find_largest_residual(e: Array) -> float:
-    """The largest |e|, 0 of none."""
+    """The largest |e|; 0 if there are no equations."""
     return float(np.max(np.abs(e), initial=0.0))

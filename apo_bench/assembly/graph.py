@@ -29,7 +29,7 @@ class Node:
     placed: int | None
     """The operation that put it there, counted from 0; None for a part that was never moved."""
     odl: ODL
-    """What its pose is a product of; empty for a part that was never moved."""
+    """The product of motion parameters that gives its pose; empty for a part that was never moved."""
 
     def __str__(self) -> str:
         """`cube2 (6): T6 T5^-1 T2`; a part that was never moved has the T0 of the paper's work table."""
@@ -53,16 +53,16 @@ class Arc:
     lost: int | None
     """The operation at which they disappeared, or None while they stand."""
     gaps: tuple[Gap, ...] = ()
-    """How far apart the faces of each contact are asked to be; empty stands for `centred` throughout."""
+    """The requested gap of each contact; empty: `centred` for all."""
     axial: bool = False
-    """Whether a round face is among them."""
+    """Whether a contact has a round face."""
 
     def __str__(self) -> str:
         return f"{self.name} {self.manipulated.part} -> {self.environment.part}"
 
     @property
     def pairs(self) -> tuple[str, ...]:
-        """The faces that touch, manipulated first: `nz-top`; with what is asked of them, if that is not `centred`."""
+        """The faces in contact, manipulated first: `nz-top`; with the requested gap, if it is not `centred`."""
         gaps = self.gaps or (Gap(),) * len(self.contacts)
         return tuple(
             f"{contact.manipulated.face}-{contact.environment.face}{'' if gap == Gap() else f' ({gap})'}"
@@ -82,9 +82,9 @@ class Graph:
     """The relation graph after some operations."""
 
     step: int
-    """How many operations are done."""
+    """Number of operations done."""
     nodes: tuple[Node, ...]
-    """Parts that were never moved first, then as they were placed, main parts before those they carried."""
+    """Parts that were never moved first, then in the order of placement, main parts before the parts they carried."""
     arcs: tuple[Arc, ...]
 
     def stands(self, node: Node) -> bool:
@@ -95,7 +95,7 @@ class Graph:
 def build_relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     """The graph after `step` operations (None: all of them).
 
-    Nodes are the fixed parts, the parts that were moved, and what arcs hang on.
+    Nodes are the fixed parts, the parts that were moved, and the ends of arcs.
 
     Raises:
         InputError: There is no such step.
@@ -111,7 +111,7 @@ def build_relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     arcs = _arcs(done, history)
     present = [node for node in history[-1].values() if node.placed is not None or node.part in done.fixed]
     joined = [node for arc in arcs for node in (arc.manipulated, arc.environment)]
-    # When a part was placed; the main part of an operation, whose ODL is a single T, before what it carried.
+    # By time of placement; the main part of an operation, whose ODL is a single T, before the parts it carried.
     nodes = sorted(dict.fromkeys([*present, *joined]), key=lambda node: (_time(node), len(node.odl)))
     return Graph(len(done), tuple(nodes), arcs)
 
@@ -134,7 +134,7 @@ def compute_observed_residuals(observation: Observation, graph: Graph) -> tuple[
 
 
 def _history(assembly: Assembly) -> list[dict[str, Node]]:
-    """The node of every part before the first operation and after each."""
+    """The node of every part before the first operation, and after each."""
     now = {part: Node(part, None, ()) for part in assembly.solids}
     history = [now]
     for k, (operation, odls) in enumerate(zip(assembly.operations, assembly.odls(), strict=True)):
@@ -144,7 +144,11 @@ def _history(assembly: Assembly) -> list[dict[str, Node]]:
 
 
 def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]:
-    """One for each pair of parts and operation."""
+    """One arc for each pair of parts that an operation brings into contact.
+
+    Args:
+        history: As returned by `_history`.
+    """
     together: dict[tuple[int, str, str], list[Relation]] = {}
     for relation in assembly.relations():
         manipulated, environment = relation.contact
@@ -160,4 +164,5 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
 
 
 def _time(node: Node) -> int:
+    """The operation that placed a node, -1 for a part that was never moved: a sort key."""
     return -1 if node.placed is None else node.placed

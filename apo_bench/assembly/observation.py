@@ -1,4 +1,4 @@
-"""What was observed of a demonstration: noisy poses with their stated covariances, all that a corrector may use."""
+"""Observed poses of a demonstration with their stated noise: all that a corrector may use."""
 
 from dataclasses import dataclass
 from typing import final

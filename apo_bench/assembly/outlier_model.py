@@ -1,4 +1,4 @@
-"""How often observations are worse than their noise model says, and in which way."""
+"""Rates and sizes of outliers, for correctors that allow for observations worse than the stated noise."""
 
 from dataclasses import dataclass
 from typing import final
@@ -8,35 +8,37 @@ import numpy as np
 from apo_bench.errors import require
 
 _LEAST_RATE = 1e-3
-"""A rate that is measured as 0 is not known to be smaller."""
+"""Least rate of a measured model: a rate measured as 0 may still be as large as this."""
 
 
 @final
 @dataclass(frozen=True)
 class OutlierModel:
-    """Rates and breadths: stated by noise that knows them, assumed otherwise."""
+    """Rates and sizes of outliers, stated by the noise model if it knows them, otherwise assumed."""
 
     gross: float = 0.1
-    """Part of the operations of which what was observed says nothing."""
+    """Fraction of operations whose observation says nothing of the pose."""
     broad: float = 0.03
-    """Part that is observed with `times` the stated deviation."""
+    """Fraction of operations observed with `times` the stated standard deviation."""
     times: float = 10.0
+    """Ratio of the standard deviation of broad observations to the stated one."""
     relation: float = 0.001
-    """Part of the relations that are wrong."""
+    """Fraction of relations that are wrong."""
     flip: float = 0.25
-    """Part of the gross ones of a part that nearly looks the same after some turns that are turned so."""
+    """Share of the gross observations that are turned by an approximate symmetry, of parts that have one."""
     stale: float = 0.15
-    """Part of the gross ones that are where the part was before."""
+    """Share of the gross observations that are where the part was before."""
     swap: float = 0.1
-    """Part of the gross ones that are where another part is, which is observed here in turn."""
+    """Share of the gross observations that are exchanged with those of another part."""
     shift: float = 0.2
-    """Part of the gross ones that are turned rightly and too near or too far; what is left over has no name."""
+    """Share of the gross observations that have the right rotation but are too near or too far. The remaining share is
+    anywhere."""
     view: float = 0.02
-    """How often several operations, one after the other, are displaced together."""
+    """Probability that several consecutive operations are displaced together."""
     repeat: float = 0.2
-    """How often a later look repeats what was false in the first."""
+    """Probability that a later observation repeats the error of a false one."""
     camera_m: tuple[float, float, float] | None = None
-    """Where the camera stands, world frame, [m]: what is too near or far is so on its ray. None: in any direction."""
+    """Position of the camera, world frame, [m]: distance errors are along its ray. None: in any direction."""
 
     def __post_init__(self) -> None:
         named = self.flip + self.stale + self.swap + self.shift
@@ -50,19 +52,21 @@ class OutlierModel:
 
     @property
     def surprises(self) -> tuple[float, float, float]:
-        """-2 log of the probability of an inlier, a broad and a gross observation, relative to that of an inlier."""
+        """-2 log of the probability of an inlier, a broad and a gross observation, in this order, relative to an
+        inlier.
+        """
         inlier = 1.0 - self.gross - self.broad
         return 0.0, -2.0 * float(np.log(self.broad / inlier)), -2.0 * float(np.log(self.gross / inlier))
 
     @property
     def relation_surprise(self) -> float:
-        """The same of a wrong relation, relative to a right one."""
+        """-2 log of the probability of a wrong relation, relative to a right one."""
         return -2.0 * float(np.log(self.relation / (1.0 - self.relation)))
 
 
 def make_measured_model(
     gross: float, broad: float = OutlierModel.broad, times: float = OutlierModel.times
 ) -> OutlierModel:
-    """A model with rates that were measured, kept away from 0 and 1, which no number of measurements proves."""
+    """A model with measured rates, limited to the range from 0.001 to 0.49, since no measurement proves 0 or 1."""
     gross, broad = (float(np.clip(rate, _LEAST_RATE, 0.49)) for rate in (gross, broad))
     return OutlierModel(gross, broad, times)

@@ -1,8 +1,8 @@
-"""What the contact equations of an assembly have in common, wherever its parts are; and which faces look away.
+"""Pose-independent part of the contact equations of an assembly, and the test of which faces fail to oppose.
 
-The equations say that vertices of one face lie in the plane of the other, whichever way the two look: a cube upside
-down inside the table satisfies them as well as one that stands on it. So `find_faces_away` tests this. Nothing
-keeps a cone on a rim from tilting, so it may by up to a right angle; planes through an axis have no sense.
+The equations state that vertices of one face lie in the plane of the other, whichever way the faces look. A cube upside
+down inside the table satisfies them as well as one that stands on it, so `find_faces_away` tests the normals. A cone on
+a rim may tilt by up to a right angle. Planes through an axis have two equal sides and pass always.
 """
 
 import math
@@ -19,21 +19,24 @@ from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inver
 from apo_bench.geometry import Array, Face, remember
 
 _MOST_CORNERS = 8
-"""Of an outline with more, such as a circle, those farthest out in so many directions say as much."""
+"""Most corners of an outline that are used; of more, such as a circle, the outermost ones in so many directions."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """What the equations of an assembly have in common, wherever its parts are: c contacts with m vertices."""
+    """The pose-independent part of the equations of an assembly: c contacts with m vertices."""
 
     words: tuple[ODL, ...]
     """D_a^-1 D_b of each contact, simplified; term k stands for the start of part k, then for the operations."""
     letters: NDArray[np.intp]
-    """(c, w), as `Equations` has it; so are `inverse`, `made` and `contact`."""
+    """(c, w), as in `Equations`."""
     inverse: NDArray[np.bool_]
+    """(c, w), as in `Equations`."""
     made: NDArray[np.intp]
+    """(c,), as in `Equations`."""
     contact: NDArray[np.intp]
+    """(m,), as in `Equations`."""
     begin: NDArray[np.intp]
     """(c + 1,): contact i has the vertices begin[i] .. begin[i + 1] - 1."""
     plane: Array
@@ -43,27 +46,29 @@ class Pattern:
     corners: Array
     """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
     laid: NDArray[np.bool_]
-    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the poses."""
+    """(c,): whether the corners are those of the manipulated face, which are projected onto the environment face at the
+    poses."""
     freed: tuple[int, ...]
     """The operations whose motion parameters occur, the most recent first."""
     opposing: Array
-    """(c,): the largest cosine between normals of faces that look at each other; infinite of planes through an axis."""
+    """(c,): the largest cosine between normals that oppose; infinite for planes through an axis."""
 
 
 @remember
 def find_contact_pattern(assembly: Assembly) -> Pattern:
-    """What the equations of an assembly have in common; its contacts are those of `project_round_faces(assembly)`."""
+    """The pose-independent part of the equations; contacts are those of `project_round_faces(assembly)`."""
     if (low := project_round_faces(assembly)) is not assembly:
         return find_contact_pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
     c = len(chosen)
     width = max((len(word) for _, _, word in chosen), default=0)
-    padding = (len(parts) + len(assembly), False)
+    padding = (len(parts) + len(assembly), False)  # index of the identity, not inverted
     padded = [[*word, *[padding] * (width - len(word))] for _, _, word in chosen]
     table = np.array(padded, dtype=np.intp).reshape(c, width, 2)
     flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
     pairs = [(flats[contact.manipulated], flats[contact.environment]) for contact, _, _ in chosen]
+    # The corners are those of the smaller face; True: that is the manipulated one.
     laid = [environment.area > manipulated.area * (1 + 1e-9) for manipulated, environment in pairs]
     corners = [(a if own else b).corners for (a, b), own in zip(pairs, laid, strict=True)]
     begin = np.cumsum([0, *map(len, corners)])
@@ -86,6 +91,7 @@ def find_contact_pattern(assembly: Assembly) -> Pattern:
 
 
 def _opposing(assembly: Assembly, contact: Contact) -> float:
+    """The largest cosine between the normals of the faces of a contact at which they oppose."""
     if not assembly.face(contact.manipulated).opposes:
         return math.inf
     tilts = (
@@ -96,8 +102,9 @@ def _opposing(assembly: Assembly, contact: Contact) -> float:
 
 
 def find_faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[np.bool_]:
-    """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
-    `relations()`; those of round faces as `project_round_faces` has them.
+    """Which contacts have faces that do not oppose when they are made, (*, c), in the order of `relations()`.
+
+    Contacts of round faces are those of `project_round_faces`.
 
     Args:
         poses: (*, n, 4, 4), world frame, [m].
@@ -123,10 +130,11 @@ def find_faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[n
 
 
 def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, int, ODL]]:
-    """Every contact ever made, the operation that made it, and D_a^-1 D_b, simplified.
+    """Every contact ever made, the operation that made it, and its word D_a^-1 D_b, simplified.
 
-    Term k stands for the start of part k, then for the operations.
+    Term k of a word is the start pose of part k, or after those of all parts the pose of an operation.
     """
+    # One operation per part in front, which puts the part at its start: so start poses are letters too.
     rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
     return [
         (contact, k - len(parts), simplify_odl((*invert(D[contact.manipulated.part]), *D[contact.environment.part])))
@@ -136,15 +144,18 @@ def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, in
 
 
 class _Flat(NamedTuple):
-    """What the equations need of a face, measured once."""
+    """Corners, plane and area of a face, as the equations need them."""
 
     corners: Array
+    """(k, 3), [m]."""
     plane: Array
+    """(4,), as of Eq. 1."""
     area: float
+    """[m^2]; 0 for a sheet."""
 
 
 def _flat(face: Face) -> _Flat:
-    """Corners (k, 3), face equation of Eq. 1 (4,), area inside the outline (Newell's formula)."""
+    """Measure a face: corners, plane and area inside the outline (Newell's formula)."""
     corners = face.outline
     if face.stated_normal is not None:
         return _Flat(corners, face.plane, 0.0)
@@ -156,7 +167,11 @@ def _flat(face: Face) -> _Flat:
 
 
 def _outermost(corners: Array, n: Array) -> Array:
-    """At most `_MOST_CORNERS` corners of an outline, in its order: any three that lie in no line fix its plane."""
+    """At most `_MOST_CORNERS` corners of an outline, in its order.
+
+    Args:
+        n: The unit normal, (3,).
+    """
     if len(corners) <= _MOST_CORNERS:
         return corners
     x = corners[1] - corners[0]

@@ -1,4 +1,4 @@
-"""What the robot is asked to do: target poses, and the order in which operations are done and undone."""
+"""Plan of the robot: target poses, and the order in which operations are done and undone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +12,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import Array, freeze, make_copyable
 
 SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
+"""The remedy in error messages about schedules."""
 
 
 class Step(NamedTuple):
@@ -62,10 +63,10 @@ class Plan:
 
 
 def find_schedule_fault(schedule: Sequence[Step], operations: int) -> str:
-    """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
+    """The fault of a schedule in words, such as `undoes operation 2, which is not done`; empty if there is none.
 
-    What is done is always the first few operations: an operation may stand on all that came before it, and what was
-    undone last first leaves free the place that it came from.
+    The operations that are done are always the first few. An operation may rest on all earlier ones, so only the last
+    one that is done may be undone.
     """
     done = 0
     for k, undo in schedule:
@@ -83,7 +84,7 @@ def find_schedule_fault(schedule: Sequence[Step], operations: int) -> str:
 
 
 def list_poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
-    """How many operations are done, and the poses in force, before each time something is undone and at the end."""
+    """The number of operations done, and target poses, (n, 4, 4), before each run of undo steps and at the end."""
     poses = np.array(plan.target_poses)
     done = 0
     stages = []

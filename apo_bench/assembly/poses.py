@@ -1,4 +1,4 @@
-"""Where every part stands: poses by part, and how operations change them."""
+"""Poses of all parts, by name, and how operations change them."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -14,21 +14,21 @@ Poses = Mapping[str, Array]
 
 
 def compute_placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[Poses, ...]:
-    """The pose of every part after each operation, what an ODL stands for (Section 3.2.1), by walking the operations.
+    """The pose of every part after each operation, as its ODL gives it (Section 3.2.1).
 
     Args:
         start: Poses before the first operation, world frame, [m].
         poses: (n, 4, 4), world frame, [m].
 
     Returns:
-        One mapping per operation; a part that was not moved yet stands where it started.
+        One mapping per operation; a part that was not moved yet is at its start.
     """
     history: list[Poses] = []
     now = dict(start)
     for operation, goal in zip(assembly.operations, poses, strict=True):
         before = now[operation.main]
         now = dict(now)
-        # What is carried keeps its place on the main part: T_world_carried = T_goal T_before^-1 T_world_carried.
+        # A carried part keeps its pose relative to the main part: T_world_carried = T_goal T_before^-1 T_world_carried.
         for part in operation.carries:
             now[part] = goal @ pose.inverse(before) @ now[part]
         now[operation.main] = goal
@@ -37,10 +37,10 @@ def compute_placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[
 
 
 def list_alternatives(poses: Poses) -> list[Poses]:
-    """The poses of each of several alternatives, (4, 4) per part.
+    """Split poses with several alternatives into one mapping, (4, 4) per part, for each alternative.
 
     Args:
-        poses: Of all, (r, 4, 4), or (4, 4) of parts that have one pose in all of them; at least one alternative.
+        poses: (r, 4, 4) for parts that have r alternatives, (4, 4) for parts with one pose in all of them.
     """
     count = max((len(T) for T in poses.values() if T.ndim == 3), default=1)
     every = {part: np.broadcast_to(T, (count, 4, 4)) for part, T in poses.items()}

@@ -1,9 +1,9 @@
-"""Contacts of round faces as contacts of planes, which is all that the face contact equations know.
+"""Round contacts as contacts of planes: sheets, which are planes and points of axes, replace round faces.
 
-A contact says that points of one part lie on planes of another one (Eq. 1). Of round faces these are points and planes
-of the axis: two points of the axis of a hole on two planes through the axis of its shaft, say. Here every contact of
-round faces becomes contacts of sheets, flat faces that no part has: a plane that goes through the axis or stands on it,
-or a few points of it.
+A contact equation says that points of one part lie on planes of another one (Eq. 1). For round faces these are points
+and planes of axes: for example, two points of the axis of a hole on two planes through the axis of its shaft. Every
+contact of round faces becomes contacts of sheets. A sheet is a flat face that no part has: a plane through the axis or
+perpendicular to it, or a few points of it.
 
 | contact | points | planes | fixes |
 |---|---|---|---|
@@ -12,9 +12,9 @@ or a few points of it.
 | cone in cone | as shaft in hole, and the middle of the shorter | and one across it where the radii are the same | 5 |
 | cone on rim | the middle of the rim | two through the axis of the cone, one across it where it is as wide | 3 |
 
-Which two planes through an axis does not matter, as long as they are perpendicular; they follow the axes of the frame
-of the face (`RoundFace.frame`), and the equations of the paper take these as well. Play of a shaft is a disc: where
-anything within it is allowed, there are `WALLS` planes in place of two.
+Any two perpendicular planes through an axis serve; they follow the axes of the frame of the face (`RoundFace.frame`).
+The equations of the paper use these sheets as well. The play of a shaft is a disc: where it may be anywhere within
+that, `WALLS` planes replace the two.
 """
 
 from collections.abc import Sequence
@@ -29,14 +29,17 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, Face, RoundFace, remember
 
 _BEHIND = "|"
-"""Between the name of a face and what a sheet adds to it: no name of a face has it."""
+"""Separator between the name of a face and the suffix of its sheet; no name of a face contains it."""
 _SAME_M = 1e-9
+"""Length difference up to which two faces count as equally long, [m]."""
 
 
 def project_round_faces(assembly: Assembly) -> Assembly:
-    """An assembly in which all contacts are of planes, with sheets for round faces; the same if it has none.
+    """Replace all contacts of round faces by contacts of sheets; an assembly without round contacts is returned as it
+    is.
 
-    Operations, ODLs and arcs are the same, solids too. `Assembly.given` says what each contact is part of.
+    Operations, ODLs, arcs and solids stay the same. `Assembly.given` returns the contact that a contact of sheets
+    stands for.
 
     Raises:
         InputError: A contact of round faces asks for a gap that it cannot have.
@@ -45,20 +48,20 @@ def project_round_faces(assembly: Assembly) -> Assembly:
 
 
 def project_observation(observation: Observation) -> Observation:
-    """An observation of such an assembly; the same if nothing is round."""
+    """The observation with its assembly projected by `project_round_faces`; unchanged if it has no round contacts."""
     low = project_round_faces(observation.assembly)
     return observation if low is observation.assembly else replace(observation, assembly=low)
 
 
 def project_observations(observations: Sequence[Observation]) -> Sequence[Observation]:
-    """Observations of one assembly, each as `project_observation` has it."""
+    """Apply `project_observation` to observations of one assembly."""
     alike = bool(observations) and project_round_faces(observations[0].assembly) is observations[0].assembly
     return observations if alike else [project_observation(one) for one in observations]
 
 
 @remember
 def _project(assembly: Assembly) -> Assembly | None:
-    """None of an assembly without round contacts: what is remembered of an object must not keep it alive."""
+    """The projected assembly; None without round contacts, since a cached result must not keep its own key alive."""
     if not any(assembly.is_round(contact) for operation in assembly.operations for contact in operation.contacts):
         return None
     gaps = dict(assembly.gaps)
@@ -72,7 +75,7 @@ def _project(assembly: Assembly) -> Assembly | None:
 
 
 class _Sheets:
-    """The sheets of an assembly, as they are asked for."""
+    """Builds the sheets of an assembly, contact by contact."""
 
     def __init__(self, assembly: Assembly) -> None:
         self._assembly = assembly
@@ -80,7 +83,7 @@ class _Sheets:
         self.origin: dict[Contact, Contact] = {}
 
     def of(self, contact: Contact) -> list[Contact]:
-        """The contacts that one stands for."""
+        """The contacts of sheets that replace a contact; a flat contact replaces itself."""
         if not self._assembly.is_round(contact):
             return [contact]
         kind = classify_contact(*map(self._assembly.face_of, contact))
@@ -102,7 +105,7 @@ class _Sheets:
         return lower
 
     def _on_plane(self, contact: Contact) -> Contact:
-        """A shaft on a plane: its axis, in the plane a radius in front."""
+        """The contact of a shaft on a plane: its axis lies in the plane raised by the radius."""
         flat, wall = _first(contact, contact.environment.face in self._assembly.solids[contact.environment.part].rounds)
         face = self._assembly.face(flat)
         shaft = self._assembly.round_face(wall)
@@ -111,7 +114,9 @@ class _Sheets:
         return Contact(plane, self._axis(wall, "1 of 1", 0.0))
 
     def _coaxial(self, planes_of: PartFace, points_of: PartFace, count: int) -> list[Contact]:
-        """The axis of one face, or its point of a rim, in planes through the axis of another one, evenly turned."""
+        """The contacts of the axis of one face, or the centre of a rim, with `count` planes through the axis of another
+        one.
+        """
         face = self._assembly.round_face(planes_of)
         contacts = []
         for i in range(count):
@@ -122,7 +127,9 @@ class _Sheets:
         return contacts
 
     def _seat(self, cone_of: PartFace, other_of: PartFace) -> Contact:
-        """The middle of a face in the plane across a cone where both are as wide."""
+        """The contact of the middle of a face with the plane across a cone where the cone has the radius of that
+        face.
+        """
         cone = self._assembly.round_face(cone_of)
         other = self._assembly.round_face(other_of)
         at = cone.where_wide(other.radius)[None]
@@ -130,7 +137,12 @@ class _Sheets:
         return Contact(plane, self._sheet(other_of, "middle", other.middle[None], _outward(other), other.fit))
 
     def _axis(self, of: PartFace, tail: str, turn: float) -> PartFace:
-        """The ends of the axis of a face, a single point of a rim; each of several planes has points of its own."""
+        """A sheet of the ends of the axis of a face, or of the centre of a rim; each plane gets its own sheet.
+
+        Args:
+            tail: Suffix of the name.
+            turn: Angle of the normal about the axis, [rad].
+        """
         face = self._assembly.round_face(of)
         points = face.ends[:1] if face.kind == "rim" else face.ends
         return self._sheet(of, f"axis {tail}", points, face.around(turn), face.fit, opposes=False)
@@ -138,31 +150,34 @@ class _Sheets:
     def _sheet(
         self, of: PartFace, tail: str, points: Array, normal: Array, fit: bool, opposes: bool = True
     ) -> PartFace:
+        """Add a sheet to the part of a face, named after the face with a suffix."""
         named = PartFace(of.part, f"{of.face}{_BEHIND}{tail}")
         self.sheets[named] = Face(named.face, points, fit=fit, stated_normal=normal, opposes=opposes)
         return named
 
     def _mark(self, low: Contact) -> Contact:
-        """A contact whose plane belongs to the environment of the given one, under a name that says so."""
+        """Rename the plane of a contact whose manipulated part is the environment of the original contact."""
         named = low.manipulated._replace(face=f"{low.manipulated.face}, turned round")
         self.sheets[named] = replace(self.sheets[low.manipulated], name=named.face)
         return Contact(named, low.environment)
 
 
 def _first(contact: Contact, manipulated: bool) -> tuple[PartFace, PartFace]:
-    """Both faces of a contact, beginning with the manipulated one or with the other."""
+    """Both faces of a contact; the manipulated one first, or last if `manipulated` is False."""
     return (contact.manipulated, contact.environment) if manipulated else (contact.environment, contact.manipulated)
 
 
 def _outward(face: RoundFace) -> Array:
-    """Which way a cone or a rim looks out of its part: a countersink where it widens, a taper where it narrows."""
+    """The outward direction of a cone or a rim along its axis: a countersink where it widens, a taper where it
+    narrows.
+    """
     if face.kind == "rim":
         return face.axis
     return face.axis * (np.sign(face.slope) if face.hole else -np.sign(face.slope))
 
 
 def _check_gap(contact: Contact, kind: str | None, gap: Gap) -> None:
-    """Refuse what cannot be asked of round faces."""
+    """Reject gaps that contacts of round faces cannot have."""
     require(kind is not None, f"{contact}: these two faces make no contact; name a shaft and its hole, say.")
     require(
         kind not in ("cone in cone", "cone on rim") or gap.kind == "centred",

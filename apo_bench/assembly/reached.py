@@ -1,4 +1,4 @@
-"""What a replay reached: the states of the parts, which the judge looks at, and how the replay ended."""
+"""Result of a replay: the states of the parts, which the judge checks, and how the replay ended."""
 
 from dataclasses import dataclass
 from typing import final
@@ -13,16 +13,16 @@ from apo_bench.geometry import freeze, make_copyable
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """The physical state when an operation was over, or at the end."""
+    """The physical state after an operation, or at the end."""
 
     poses: Poses
-    """Every part, fixed ones too."""
+    """World poses of all parts, fixed ones too, [m]."""
     penetration_m: float
-    """Deepest overlap of two physical geoms of different parts, >= 0."""
+    """Deepest penetration of two physical geoms of different parts, >= 0."""
     speed_m_s: float
-    """Fastest centre of a part."""
+    """Largest speed of the centre of a part."""
     spin_rad_s: float
-    """Fastest turning part."""
+    """Largest angular speed of a part."""
     released: bool
     """Whether no hand or gripper touches a part."""
 
@@ -33,15 +33,16 @@ class Snapshot:
 @final
 @dataclass(frozen=True)
 class Outcome:
-    """How a replay ended, as the robot knows it, or a whole trial, as the judge knows it."""
+    """How a replay ended, as known to the robot, or a whole trial, as known to the judge."""
 
     stage: str
-    """`done`, or where it failed."""
+    """`done`, or the stage that failed."""
     code: str
     """`ok`, or one of the codes in `apo_bench.records.outcomes`."""
     operation: int | None
-    """Counted from 0."""
+    """The operation that failed, counted from 0, or None."""
     sentence: str
+    """The outcome in words."""
 
     @property
     def failed(self) -> bool:
@@ -51,7 +52,7 @@ class Outcome:
 @final
 @dataclass(frozen=True, eq=False)
 class ReachedState:
-    """What the judge looks at: nothing but physics."""
+    """The input of the judge: physical states only."""
 
     after: tuple[Snapshot | None, ...]
     """After each operation; None for one that was not finished."""
@@ -62,36 +63,40 @@ class ReachedState:
 @final
 @dataclass(frozen=True)
 class SlipInHand:
-    """How far a part moved in the hand since it was grasped: flat pads hold a shaft along two lines only.
+    """How far a part moved in the hand since it was grasped; pads hold a shaft along two lines only, so it may roll.
 
-    A length is that of the point between the pads, an angle any turn: rolling between them and turning about them.
+    Lengths are those of the point between the pads; angles count any rotation, rolling between the pads too.
     """
 
     operation: int
     """Counted from 0."""
     carried_m: float
+    """Slip when the last motion, to its place, began."""
     carried_rad: float
-    """When the last motion, to its place, began."""
+    """The rotation at that time."""
     moved_m: float
+    """Slip when the part was released, or the replay failed; the larger one if the grip was changed."""
     moved_rad: float
-    """When it was let go of, or the replay failed; the larger one where the grip was changed."""
+    """The rotation at that time."""
 
 
 @final
 @dataclass(frozen=True)
 class ProbingResult:
-    """What a robot has found out about itself by touching, and how sure it is."""
+    """The calibration error of a robot as estimated by contact probing, with its uncertainty."""
 
     touches: int
-    """How many touches were used."""
+    """Number of touches that were used."""
     refused: int
-    """How many contradict the others and what is stated of the robot."""
+    """Number of touches that contradict the others and the stated errors of the robot."""
     mm: float
+    """Estimated displacement of the base, at the middle of the poses, [mm]."""
     deg: float
-    """How far the base is assumed to be off, at the middle of the poses."""
+    """Estimated rotation of the base, [deg]."""
     sure_mm: float
+    """Standard deviation of the displacement, root of the summed variances, [mm]."""
     sure_deg: float
-    """Standard deviations of that, as root mean squares."""
+    """Standard deviation of the rotation, root of the summed variances, [deg]."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""Errors that several operations share: a camera that is not where it is assumed, a model with a wrong origin.
+"""Errors that several operations share, such as a displaced camera or a model with a wrong origin.
 
 A shared error is a twist c with a covariance, in a stated frame. It takes the observed poses to the true ones: as the
 body twist of operation k it is A_k c, T_k = T_observed_k exp(A_k c), with
@@ -21,20 +21,20 @@ from apo_bench.geometry import Array, freeze, make_copyable, pose
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class SharedError:
-    """A part of the errors of some operations that is the same in all of them, or correlated."""
+    """The part of the errors of some operations that is the same in all of them, or correlated."""
 
     name: str
-    """What is wrong: `camera`, or the name of a part."""
+    """Source of the error: `camera`, or the name of a part."""
     operations: tuple[int, ...]
-    """Those that share it, counted from 0."""
+    """The m operations that share it, counted from 0."""
     covariance: Array
-    """(6, 6), of the twist c, [m, rad]; a part of the covariance that each of these operations states."""
+    """(6, 6), of the twist c, [m, rad]; included in the covariance that each of these operations states."""
     frame: Array | None = None
-    """(4, 4), P, world, [m]; none stands for the frame of each part."""
+    """(4, 4), P, world, [m]; None: the frame of each part."""
     local: bool = False
     """Whether only the axes of `frame` count, at the origin of each part."""
     correlation: Array | None = None
-    """(m, m): between the twists of the m operations; none stands for one and the same twist."""
+    """(m, m): correlation between the twists of the m operations; None: one and the same twist."""
 
     def __post_init__(self) -> None:
         operations = tuple(int(k) for k in self.operations)
@@ -45,7 +45,11 @@ class SharedError:
         freeze(self, covariance=(6, 6), frame=(4, 4), correlation=(m, m))
 
     def ways(self, poses: Array) -> Array:
-        """A_k of the operations that share it, (m, 6, 6); `poses` are those that were observed, (n, 4, 4)."""
+        """A_k of the operations that share the error, (m, 6, 6).
+
+        Args:
+            poses: The observed poses of all operations, (n, 4, 4), world, [m].
+        """
         seen = poses[list(self.operations)]
         if self.frame is None:
             return np.broadcast_to(np.eye(6), (len(seen), 6, 6))
@@ -55,17 +59,17 @@ class SharedError:
         return pose.adjoint(back)
 
     def added(self, poses: Array) -> Array:
-        """What it adds to the covariance of the body twists of the operations that share it, (m, 6, 6)."""
+        """The contribution to the covariance of the body twists of the operations that share the error, (m, 6, 6)."""
         A = self.ways(poses)
         C = A @ self.covariance @ np.swapaxes(A, 1, 2)
         return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
 
 
 def compute_joint_covariance(poses: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
-    """The covariance of the body twists of all operations together, (6 n, 6 n), [m, rad].
+    """The joint covariance of the body twists of all operations, (6 n, 6 n), [m, rad].
 
     Args:
-        poses: (n, 4, 4), those that were observed.
+        poses: (n, 4, 4), the observed poses.
         covariance: (n, 6, 6), of each operation by itself.
     """
     n = len(poses)
@@ -79,12 +83,12 @@ def compute_joint_covariance(poses: Array, covariance: Array, shared: Sequence[S
         if error.correlation is not None:
             between *= error.correlation[:, None, :, None]
         joint[np.ix_(k, six, k, six)] += between
-    joint[np.arange(n), :, np.arange(n)] = covariance
+    joint[np.arange(n), :, np.arange(n)] = covariance  # it includes the shared part already
     whole = joint.reshape(6 * n, 6 * n)
     return np.asarray((whole + whole.T) / 2)
 
 
 def correlate_first_order(m: int, correlation: float) -> Array:
-    """The correlations of a first-order autoregression, (m, m)."""
+    """The correlation matrix of a first-order autoregression, (m, m): correlation^|i - j|."""
     steps = np.arange(m)
     return np.asarray(correlation ** np.abs(steps[:, None] - steps))

@@ -1,7 +1,7 @@
-"""Errors with tails: Student t across a ray and along it, of shifts and of turns.
+"""Heavy-tailed pose errors: Student t for shifts and turns, across and along a ray.
 
-A covariance alone says nothing of how often errors are several times as large as usual. Where an observation states its
-tails, tests and regions are taken from draws of them.
+A covariance does not say how often errors are several times as large as usual. Where an observation states its tails,
+tests and regions are computed from draws of them.
 """
 
 from dataclasses import dataclass
@@ -13,29 +13,31 @@ import numpy as np
 from apo_bench.geometry import Array, freeze, make_copyable
 
 _COLUMNS = ((0, 1), (2,), (3, 4), (5,))
-"""Of an error (x, y, along; rx, ry, about): across, along, tilt, turn about."""
+"""Components of an error (x, y, along; rx, ry, about) by group: across, along, tilt, turn about."""
 _ANEW = 100
+"""Most redraws of errors beyond the limits."""
 _SEED = 20
+"""Seed of the draws, so that results depend on the observation alone."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Tails:
-    """How the errors of n operations are distributed; numbers in the order across, along, tilt, turn about."""
+    """The error distribution of n operations; numbers in the order across, along, tilt, turn about."""
 
     frames: Array
-    """(n, 3, 3): the axes of errors, in the frame of each part; the third is the one along."""
+    """(n, 3, 3): the axes of the errors as columns, in the frame of each part; the third is the ray."""
     scales: Array
     """(4,), of Student t, [m, m, rad, rad]."""
     freedom: Array
-    """(4,), its degrees of freedom; 1e9 and more stand for a Gaussian."""
+    """(4,), degrees of freedom; 1e9 and more stand for a Gaussian."""
     variances: Array
-    """(4,), of one direction of each, within the limits, [m^2, m^2, rad^2, rad^2]."""
+    """(4,), variance of one component of each group, within the limits, [m^2, m^2, rad^2, rad^2]."""
     limits: Array
-    """(2,): no shift, [m], and no turn, [rad], is longer."""
+    """(2,): largest length of a shift, [m], and of a turn, [rad]."""
     joined: bool = False
-    """Whether shift and turn are large together, by one number for all six directions."""
+    """Whether one random scale is common to all six components, so that shift and turn are large together."""
 
     def __post_init__(self) -> None:
         freeze(self, frames=(None, 3, 3), scales=(4,), freedom=(4,), variances=(4,), limits=(2,))
@@ -44,11 +46,10 @@ class Tails:
                 raise ValueError(f"`{name}` must be above 0, {getattr(self, name).tolist()} was given")
 
     def draws(self, joint: Array, count: int) -> Array:
-        """Body twists of all operations, (count, n, 6), [m, rad]: the same for the same tails, so that what is computed
-        of them is a function of what was observed.
+        """Draw body twists of all operations, (count, n, 6), [m, rad]; equal arguments give equal draws.
 
         Args:
-            joint: (6 n, 6 n), the covariance that is stated; what of it is not of these tails is taken for Gaussian.
+            joint: (6 n, 6 n), the stated covariance; what it has beyond these tails is drawn as a Gaussian.
         """
         n = len(self.frames)
         numbers = (tuple(getattr(self, name).tolist()) for name in ("scales", "freedom", "limits"))
@@ -83,6 +84,7 @@ def _unit_draws(
     errors = error((count, n))
     for half, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True):
         for _ in range(_ANEW):
+            # Errors beyond the limit are drawn again: the distribution is truncated.
             far = np.linalg.norm(errors[..., half], axis=-1) > limit
             if not far.any():
                 break

@@ -1,4 +1,4 @@
-"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses."""
+"""Topology of a demonstration in the paper's terms: operations, contacts and ODLs; symbols only, no poses."""
 
 import math
 from bisect import bisect
@@ -37,19 +37,21 @@ class Contact(NamedTuple):
 
 
 GapKind = Literal["contact", "centred", "clearance"]
+"""The kinds of gap, see `Gap`."""
 
 
 class Gap(NamedTuple):
-    """How far apart the nominal faces of a contact are asked to be.
+    """The requested distance of the nominal faces of a contact.
 
-    `centred` (the default): they coincide, so that parts with play stand in the middle of it. `contact`: the physical
-    faces touch, so nominal faces of parts that fit overlap by the play. `clearance`: walls, anywhere in an interval.
+    `centred` (the default): the faces coincide, so parts with play are in the middle of it. `contact`: the physical
+    faces touch, so nominal faces of fit parts overlap by the play. `clearance`: anywhere in an interval.
     """
 
     kind: GapKind = "centred"
     low_m: float | None = None
-    """The least distance of a `clearance`, negative for overlap; None stands for all the play there is."""
+    """The least distance of a `clearance`, negative for overlap; None: minus the play."""
     high_m: float | None = None
+    """The largest distance of a `clearance`; None: the play."""
 
     def __str__(self) -> str:
         """`centred`, `clearance`, `clearance from -0.2 to 0.3 mm`."""
@@ -58,7 +60,7 @@ class Gap(NamedTuple):
         return f"{self.kind} from {1e3 * self.low_m:g} to {1e3 * self.high_m:g} mm"
 
     def interval(self, play_m: float) -> tuple[float, float]:
-        """Least and greatest distance along the normal, [m], of parts with this play per side."""
+        """Least and greatest distance along the normal, [m], for parts with this play per side."""
         asked = -play_m if self.low_m is None else self.low_m, play_m if self.high_m is None else self.high_m
         return {"centred": (0.0, 0.0), "contact": (-play_m, -play_m), "clearance": asked}[self.kind]
 
@@ -67,7 +69,7 @@ class Gap(NamedTuple):
 @check_arguments
 @dataclass(frozen=True)
 class Operation:
-    """One act, without numbers: who moves, which contacts it makes, whom it carries."""
+    """One operation, without poses: the main part, the contacts that it makes, and the parts that it carries."""
 
     main: str
     contacts: tuple[Contact, ...] = ()
@@ -123,11 +125,11 @@ class Assembly:
     fixed: frozenset[str]
     """Parts that no operation moves, such as the table (stable objects, Section 2.3 of the paper)."""
     gaps: Mapping[Contact, Gap] = field(default_factory=dict)
-    """Contact -> how far apart its faces are; a contact that is not named has faces that coincide."""
+    """Contact -> requested gap; faces of a contact that is not named coincide."""
     sheets: Mapping[PartFace, Face] = field(default_factory=dict)
-    """Planes and points that stand for round faces in the contact equations."""
+    """Planes and points that replace round faces in the contact equations."""
     origin: Mapping[Contact, Contact] = field(default_factory=dict)
-    """Contact of a sheet -> the contact of the round face that it stands for."""
+    """Contact of sheets -> the contact of round faces that it stands for."""
 
     def __post_init__(self) -> None:
         freeze(self, solids=None, gaps=None, sheets=None, origin=None)
@@ -143,25 +145,25 @@ class Assembly:
         return self.solids[of.part].rounds[of.face]
 
     def face_of(self, of: PartFace) -> Face | RoundFace:
-        """A face, flat or round."""
+        """The face of a part: flat, round, or a sheet."""
         return self.sheets[of] if of in self.sheets else self.solids[of.part].face(of.face)
 
     def is_round(self, contact: Contact) -> bool:
-        """Whether a contact is of other faces than two flat ones."""
+        """Whether a face of the contact is round."""
         return any(of.face in self.solids[of.part].rounds for of in contact)
 
     def is_fit(self, contact: Contact) -> bool:
-        """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
+        """Whether a face of the contact recedes by the clearance."""
         return self.face_of(contact.manipulated).fit or self.face_of(contact.environment).fit
 
     def given(self, contact: Contact) -> Contact:
-        """The contact that one of sheets is part of; any other is itself."""
+        """The contact of round faces for which a contact of sheets stands; any other contact itself."""
         return self.origin.get(contact, contact)
 
     def play(self, contact: Contact, play_m: float) -> float:
-        """How far from nominal a contact may really be, [m]: the clearance of parts that fit, and what shapes leave.
+        """How far a contact may be from nominal, [m]: the clearance of fit parts, plus the difference of radii.
 
-        A cone whose wall recedes by the clearance lets in deeper what sits in it.
+        For the seat of a cone the clearance of the walls becomes an axial distance, clearance / sin(half angle).
         """
         whole = self.given(contact)
         fits = play_m if self.is_fit(whole) else 0.0
@@ -175,9 +177,9 @@ class Assembly:
         return max(0.0, fits + compute_geometric_play(a, b))
 
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
-        """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play.
+        """Least and greatest allowed distance of a contact, [m]; they are equal unless its gap is a `clearance`.
 
-        The play of a shaft in its hole is a disc, and what stands for it a polygon with its corners on the circle.
+        The play of a shaft in its hole is a disc, replaced by a polygon with its corners on the circle.
         """
         gap = self.gaps.get(contact, Gap())
         low, high = gap.interval(self.play(contact, play_m))
@@ -193,13 +195,13 @@ class Assembly:
 
     @remember
     def intervals(self, play_m: float) -> Array:
-        """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
+        """The least and greatest allowed distance of every contact, (c, 2), in the order of `relations()`, [m]."""
         return copy_frozen(
             np.reshape([self.interval(relation.contact, play_m) for relation in self.relations()], (-1, 2))
         )
 
     def first(self, n: int) -> "Assembly":
-        """What is known after n operations: the same parts, no later operation."""
+        """The assembly with only its first n operations."""
         return replace(self, operations=self.operations[:n])
 
     def odls(self) -> tuple[Mapping[str, ODL], ...]:
@@ -210,7 +212,7 @@ class Assembly:
         return tuple(MappingProxyType(dict(now)) for now in self.walk())
 
     def walk(self) -> Iterator[Mapping[str, ODL]]:
-        """The ODL of every part after each operation in turn; the mapping changes when the next one is asked for."""
+        """Yield the ODL of every part after each operation; the mapping is overwritten by the next operation."""
         current: dict[str, ODL] = {}
         for k, operation in enumerate(self.operations):
             before = current.get(operation.main, ())
@@ -234,7 +236,7 @@ class Assembly:
 
     @remember
     def arcs(self) -> tuple[tuple[int, ...], ...]:
-        """The contacts of R1, R2, ..: all that one operation makes between one pair of parts (Section 3.1).
+        """The contacts of R1, R2, ...: all that one operation makes between one pair of parts (Section 3.1).
 
         Contacts by their number in `relations()`; arcs in the order in which they were made.
         """
@@ -245,7 +247,7 @@ class Assembly:
 
     @check_arguments
     def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:
-        """Which contacts are left, (c,) in the order of `relations()`, without some.
+        """Which contacts remain, (c,) in the order of `relations()`, when some are left out.
 
         Args:
             left_out: Whole relations, such as `R3`, or single contacts of one, such as `R3: stick.py on castle1.spy`.
@@ -271,7 +273,7 @@ def invert(odl: Iterable[Term]) -> ODL:
 
 
 def simplify_odl(odl: Sequence[Term]) -> ODL:
-    """An ODL without neighbours that cancel, such as T2 T2^-1."""
+    """The ODL without neighbours that cancel, such as T2 T2^-1."""
     out: list[Term] = []
     for term in odl:
         if out and out[-1] == (term.operation, not term.inverse):
@@ -287,5 +289,5 @@ def spell(odl: Iterable[Term]) -> str:
 
 
 def evaluate_odl(odl: Iterable[Term], poses: Array) -> Array:
-    """The pose an ODL stands for, given the motion parameters `poses` (n, 4, 4) -> (4, 4)."""
+    """The pose of an ODL, (4, 4), given the motion parameters `poses`, (n, 4, 4)."""
     return reduce(np.matmul, (pose.inverse(poses[k]) if inverse else poses[k] for k, inverse in odl), np.eye(4))

@@ -1,4 +1,4 @@
-"""A touch: the robot felt that a point of its hand, or of what it holds, lies on a known plane."""
+"""A touch of contact probing: a point of the hand, or of a held part, was measured to lie on a known plane."""
 
 from dataclasses import dataclass
 from typing import Any, final
@@ -10,9 +10,9 @@ from apo_bench.errors import require
 from apo_bench.geometry import FARTHEST_M, Array, copy_frozen, freeze, is_rigid, make_copyable
 
 SMALLEST_SIGMA_M = 1e-9
-"""No touch measures a place more exactly; rounding would no longer be small against it."""
+"""Least allowed standard deviation of a touch, [m], so that rounding stays small against it."""
 _NOT_UNIT = 1e-6
-"""How far the length of a normal may be from 1."""
+"""Largest deviation of the length of a normal from 1."""
 
 
 @final
@@ -20,10 +20,10 @@ _NOT_UNIT = 1e-6
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """n . (X h v) = d: X is where the tip really is, h how the part lies in the hand, v the point."""
+    """One touch: n . (X h v) = d, with X the true pose of the tip, h that of the part in the hand, v the point."""
 
     T_world_tip: Array
-    """(4, 4): where the robot assumed its tip when it touched, [m]."""
+    """(4, 4): the pose of the tip that the robot assumed at the touch, [m]."""
     normal: Array
     """(3,): the unit normal n of the plane, world frame."""
     offset: float
@@ -31,13 +31,13 @@ class Touch:
     point: Array
     """(3,), [m]: v, in the frame of the tip, or of the part that is held."""
     sigma_m: float
-    """How exactly the touch measures the distance: a standard deviation, [m]."""
+    """Standard deviation of the measured distance, [m]."""
     jacobian: Array | None = None
-    """(6, joints): body Jacobian at `T_world_tip`, [m/rad, rad/rad]; None: as if the encoders were exact."""
+    """(6, joints): body Jacobian at `T_world_tip`, [m/rad, rad/rad]; None: the encoders count as exact."""
     grasp: int | None = None
     """The number of the grasp that held the part; None: the hand itself touched."""
     T_tip_part: Array | None = None
-    """(4, 4): where the part was assumed in the frame of the tip, [m]; None: its frame is that of the tip."""
+    """(4, 4): the assumed pose of the part in the frame of the tip, [m]; None: the identity."""
 
     def __post_init__(self) -> None:
         """Raises:
@@ -66,7 +66,7 @@ def checked_pose(name: str, value: Any) -> Array:
     """A read-only copy of a pose, (4, 4).
 
     Raises:
-        InputError: It is none.
+        InputError: It is not a rigid pose.
     """
     T = copy_frozen(value, 4, 4)
     require(is_rigid(T[None])[0], f"the {name} was given as a matrix that is no rigid pose; give a turn and a shift.")

@@ -1,4 +1,4 @@
-"""Correct many observations of one assembly at once: what they share is worked out once, the rest is one array."""
+"""Correction of many observations of one assembly in batches, which are faster than one observation at a time."""
 
 from collections.abc import Sequence
 from math import ceil
@@ -11,9 +11,9 @@ from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.errors import require
 
 BATCH = 150
-"""Observations that are solved together, at most."""
+"""Most observations that are solved together."""
 _LARGEST_JACOBIANS = 96_000
-"""Entries of all their Jacobians: more would leave the cache of the processor."""
+"""Most entries of the Jacobians of a batch: more would not fit the cache of the processor."""
 
 
 @check_arguments
@@ -43,6 +43,7 @@ def correct_many(
             f"observation {i} is of another assembly, start or play than observation 1; "
             "correct those together that share them.",
         )
+    # Entries of the Jacobian of one observation: three equations per contact, six unknowns per operation.
     entries = 3 * len(first.assembly.relations()) * 6 * len(first.assembly)
     most = min(BATCH, max(1, _LARGEST_JACOBIANS // max(1, entries)))
     # Batches of equal size, since a small last one takes nearly as long as others.
@@ -52,7 +53,7 @@ def correct_many(
 
 
 def _is_comparable(first: Observation, other: Observation) -> bool:
-    """Whether two observations share assembly, start and play."""
+    """Whether two observations have the same assembly, start poses and play."""
     same = other.assembly is first.assembly and other.play_m == first.play_m
     return same and {part: T.tobytes() for part, T in other.start.items()} == {
         part: T.tobytes() for part, T in first.start.items()

@@ -1,4 +1,4 @@
-"""Correct an observation by any corrector: by name, as `module:name`, or the object itself."""
+"""Public entry point of corrections: call a corrector by name or as an object, and validate what it returns."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,10 +18,11 @@ from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
 
 _STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
+"""The statuses that a corrector may return."""
 
 
 class CorrectorMisbehaved(InputError):
-    """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
+    """A corrector raised an error or returned an invalid result; the fault is the corrector's, not the request's."""
 
 
 @check_arguments
@@ -46,8 +47,8 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
     chosen = resolve_corrector(corrector)
     name = _name_of(corrector, chosen)
     ours = _is_ours(chosen)
-    # The equations know planes alone, so correctors of the package get round faces projected to planes; `contact`
-    # projects what others hand it, and leaves this as it is.
+    # The equations contain planes only, so correctors of the package get round faces projected to planes. `contact`
+    # projects the observations of direct callers too, and leaves projected ones unchanged.
     flat = project_observation(observation)
     given = flat if ours else observation
     try:
@@ -67,7 +68,7 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
 
 
 def resolve_corrector(corrector: Any) -> Any:
-    """The corrector that is named, or was given.
+    """The corrector with a name, or the given object itself.
 
     Raises:
         InputError: There is no such corrector, or it is no function.
@@ -82,13 +83,23 @@ def resolve_corrector(corrector: Any) -> Any:
 
 
 def _name_of(corrector: Any, chosen: Any) -> str:
+    """The name of a corrector in error messages."""
     return corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
 
 
 def _admit(returned: Any, observation: Observation, chosen: Any, name: str) -> Correction:
-    """Take what a corrector returned as a `Correction` that makes sense."""
+    """Convert what a corrector returned to a valid `Correction`.
+
+    Results of correctors from outside the package are checked, and the gaps that they state are replaced by measured
+    ones.
+
+    Args:
+        observation: The observation with round faces projected.
+        chosen: The corrector.
+        name: Its name in error messages.
+    """
     if isinstance(returned, Correction) and _is_ours(chosen):
-        # `ContactCorrector` has asked already which faces look the same way (`Solved.away`, `_in_doubt`).
+        # `ContactCorrector` has already checked which faces look the same way (`Solved.away`, `_in_doubt`).
         return returned if isinstance(chosen, ContactCorrector) else check_facing(observation, returned)
     if not isinstance(returned, Correction):
         poses = _checked_poses(returned, len(observation.poses), name)
@@ -106,9 +117,9 @@ def _admit(returned: Any, observation: Observation, chosen: Any, name: str) -> C
 
 
 def _is_ours(corrector: Any) -> bool:
-    """Whether a corrector comes with the package; the gaps that others claim are measured instead.
+    """Whether a corrector is part of the package, so that its result is trusted.
 
-    Programs and files of answers, which `apo_bench.benchmark.scoring` stands for, are others.
+    Programs and answer files, which `apo_bench.benchmark.scoring` wraps, are not.
     """
     while isinstance(corrector, partial):
         corrector = corrector.func
@@ -116,7 +127,7 @@ def _is_ours(corrector: Any) -> bool:
 
 
 def _checked_poses(returned: Any, n: int, name: str) -> Array:
-    """Poses as an array (n, 4, 4), numbers that are not finite let through."""
+    """Convert what a corrector returned to rigid poses, (n, 4, 4); poses that are not finite are let through."""
     try:
         poses = copy_real(returned)
     except ArgumentError as error:

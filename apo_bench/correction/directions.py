@@ -1,8 +1,8 @@
-"""Directions in which a part is free, in words: shifts along its own axes and turns about them, as far as they go.
+"""Readable names of the free directions of a part: shifts along its own axes, and turns about them.
 
-A space of twists is split into pure shifts and, beyond them, turns; each half gets an orthonormal basis that keeps to
-the axes of the part where it can. A turn is about the point of its axis that is nearest to the origin of the part,
-once shifts that are free anyway are taken out. What is left of a shift along the axis makes it a screw.
+A space of twists is split into pure shifts and, beyond them, turns. Each half gets an orthonormal basis that follows
+the axes of the part where possible. The axis of a turn is placed after free shifts are removed from its twist. A
+remaining shift along the axis makes the turn a screw.
 """
 
 from collections.abc import Sequence
@@ -14,17 +14,19 @@ import numpy as np
 from apo_bench.geometry import Array, copy_frozen
 
 SHIFT_NAMES = ("x", "y", "z")
+"""Names of the shifts along the axes of the part."""
 TURN_NAMES = ("roll", "pitch", "yaw")
+"""Names of the turns about the axes of the part."""
 _LENGTH_M = 0.05
-"""Way of a point per radian, at which a turn weighs as much as a shift."""
+"""Length per radian at which a turn counts as much as a shift."""
 _ZERO = 1e-6
-"""Components below this part of the largest one are rounding."""
+"""Components below this fraction of the largest one are rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """One free direction of a part."""
+    """One free direction of a part, a shift or a turn."""
 
     twist: Array
     """(6,), body frame of the part: one metre of a shift, or one radian of a turn."""
@@ -33,12 +35,15 @@ class Direction:
         object.__setattr__(self, "twist", copy_frozen(self.twist, 6))
 
     def __str__(self) -> str:
-        """`x`, `yaw`, `x with y` (oblique), `yaw with z` (a screw)."""
+        """Readable form: `x`, `yaw`, `x with y` (oblique), `yaw with z` (a screw)."""
         return " with ".join(self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The axes that take part, the most important first; of a turn whose point is not the origin, the axes only."""
+        """Names of the axes that take part, the largest component first; for a screw also those of its shift.
+
+        The position of a turn's axis is not part of the name.
+        """
         words = TURN_NAMES if self.turns else SHIFT_NAMES
         order = np.argsort(-np.abs(self.axis).round(6), kind="stable")
         own = [words[i] for i in order if abs(self.axis[i]) > _ZERO]
@@ -47,30 +52,35 @@ class Direction:
 
     @property
     def turns(self) -> bool:
-        """Whether it is a turn, maybe with a shift along its axis; otherwise a shift."""
+        """Whether the direction is a turn, possibly a screw; otherwise it is a shift."""
         return bool(np.any(self.twist[3:]))
 
     @property
     def axis(self) -> Array:
-        """Unit vector, (3,), frame of the part."""
+        """Unit vector of the shift, or of the axis of the turn, (3,), frame of the part."""
         return self.twist[3:] if self.turns else self.twist[:3]
 
     @property
     def point(self) -> Array:
-        """The point of the axis of a turn that is nearest to the origin of the part, (3,), [m]."""
+        """The point of the axis of a turn nearest to the origin of the part, (3,), [m]."""
         return np.cross(self.twist[3:], self.twist[:3])
 
     @property
     def pitch_m(self) -> float:
-        """How far a turn goes along its own axis, per radian, [m]; 0 of a shift."""
+        """Shift along the axis per radian of a turn, [m]; 0 of a shift."""
         return float(self.twist[:3] @ self.twist[3:])
 
 
 def directions(space: Array) -> tuple[Direction, ...]:
-    """A readable basis of a space of body twists, given by the columns of (6, f), [m, rad]: shifts, then turns."""
+    """A readable basis of a space of body twists, shifts first, then turns.
+
+    Args:
+        space: The twists that span it, as columns, (6, f), [m, rad].
+    """
     weights = np.array([1.0, 1.0, 1.0, _LENGTH_M, _LENGTH_M, _LENGTH_M])
     F = _span(space * weights[:, None])
     _, w, Vt = np.linalg.svd(F[3:], full_matrices=True)
+    # Combinations of the columns without rotation are pure shifts; the other `turning` ones are turns.
     turning = int(np.count_nonzero(w > _ZERO))
     shifts = _align(_span(F[:3] @ Vt[turning:].T))
     turns = F @ Vt[:turning].T
@@ -83,7 +93,7 @@ def directions(space: Array) -> tuple[Direction, ...]:
 
 
 def held(free: Sequence[Direction]) -> tuple[str, ...]:
-    """The words for what is not free: six less those that free directions are mainly along."""
+    """Names of the directions that are not free: all six names, less the first name of each free direction."""
     taken = {direction.names[0] for direction in free}
     return tuple(name for name in (*SHIFT_NAMES, *TURN_NAMES) if name not in taken)
 
@@ -95,7 +105,7 @@ def _span(columns: Array) -> Array:
 
 
 def _align(basis: Array) -> list[Array]:
-    """An orthonormal basis, (3,) each, of a space of vectors (3, d), the nearest axis first each time."""
+    """An orthonormal basis, (3,) each, of the span of orthonormal columns (3, d), as close to the axes as possible."""
     P = basis @ basis.T
     vectors = list[Array]()
     for _ in range(basis.shape[1]):

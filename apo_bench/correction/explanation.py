@@ -1,11 +1,11 @@
-"""What the contacts determine: which directions of every operation they fix, through which relations, and how well.
+"""Degrees of freedom of a demonstration: which directions contacts fix, through which relations, and how certainly.
 
-Operations are taken in their order. Those before are given, those behind adapt: the free directions of operation k
-are its block of the null space of the Jacobian without the columns of earlier operations. Counted so, the free
-dimensions of all operations add up to the freedom of the whole, and their ranks to its rank.
+Operations are taken in order: earlier ones are given, later ones adapt. The free directions of operation k are its
+block of the null space of the Jacobian without the columns of earlier operations. Counted so, the free dimensions of
+all operations add up to the freedom of the whole, and their ranks to its rank.
 
-How uncertain a direction still is comes from the posterior of all poses at once, so a free direction is as uncertain
-as it was observed, or less where several parts that must move together were observed.
+Uncertainties come from the joint posterior of all poses. A free direction is as uncertain as its observation, or less
+if several parts that must move together were observed.
 """
 
 from collections.abc import Collection, Iterator
@@ -47,27 +47,28 @@ class FreeDirection:
 
     direction: Direction
     deviation: float
-    """Posterior standard deviation along it, [m] of a shift, [rad] of a turn."""
+    """Posterior standard deviation along it, [m] for a shift, [rad] for a turn."""
     along: tuple[int, ...] = ()
-    """The later operations that have to go with it, counted from 0."""
+    """The later operations that must move with it, counted from 0."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class OperationExplanation:
-    """What the contacts determine of one operation, given those before."""
+    """What the contacts fix of one operation, given the earlier operations."""
 
     operation: int
     """Counted from 0."""
     part: str
     rank: int
-    """Directions that are fixed, of six."""
+    """Number of fixed directions, of six."""
     fixed: tuple[str, ...]
+    """Names of the fixed directions."""
     free: tuple[FreeDirection, ...]
     through: tuple[RelationHold, ...]
-    """An irreducible set of relations that fix as much as all of them."""
+    """An irreducible set of relations that fixes as much as all of them."""
     agreeing: tuple[RelationHold, ...]
-    """The relations of this operation that are not needed for that."""
+    """Relations made by this operation that are redundant for that."""
     covariance: Array
     """(6, 6), posterior, of the body twist at its pose, [m, rad]."""
 
@@ -75,7 +76,7 @@ class OperationExplanation:
 @final
 @dataclass(frozen=True, eq=False)
 class PartExplanation:
-    """A part at the end: where it stands in the world, and how well that is known."""
+    """The final pose of a part in the world, and its uncertainty."""
 
     part: str
     placed: int
@@ -84,40 +85,44 @@ class PartExplanation:
     pose: Array
     """(4, 4), world frame, [m]."""
     rank: int
-    """Directions that are fixed in the world."""
+    """Number of directions that are fixed in the world, of six."""
     fixed: tuple[str, ...]
+    """Names of the fixed directions."""
     free: tuple[FreeDirection, ...]
     covariance: Array
     """(6, 6), posterior, of its body twist, [m, rad]."""
 
     @property
     def deviations(self) -> Array:
-        """Posterior standard deviations along its axes, (6,), [m, rad]."""
+        """Posterior standard deviations along the axes of the part, (6,), [m, rad]."""
         return np.sqrt(np.diag(self.covariance))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What the contacts determine of a whole demonstration."""
+    """What the contacts fix of a whole demonstration."""
 
     assembly: Assembly
     poses: Array
-    """(n, 4, 4), where the contacts were linearised."""
+    """(n, 4, 4), where the contacts were linearised, world, [m]."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
-    """The parts that were moved, in the order in which they were placed."""
+    """The parts that were moved, in order of their last placement."""
     rank: int
+    """Number of directions that the contacts fix, of all operations."""
     freedom: int
+    """Number of free directions, of all operations."""
     redundant: int
     """Equations, three per contact, that follow from the others."""
     spectral_gap: float
+    """The smallest singular value that counts over the largest that does not."""
     shared: tuple[SharedEstimate, ...] = ()
-    """What is known of the errors that operations share."""
+    """Estimates of the errors that operations share."""
     left_out: tuple[int, ...] = ()
     """Operations whose observations are all rejected, counted from 0."""
     hypotheses: tuple[Hypothesis, ...] = ()
-    """What else may be assumed of what was observed, each with its weight, as of the correction."""
+    """Other explanations of the observation with their weights, as in the correction."""
 
 
 @check_arguments
@@ -200,27 +205,31 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
 
 
 def _void(assembly: Assembly, kept: NDArray[np.bool_]) -> int:
-    """How many compact equations say nothing: of contacts that are not kept, and of fewer than three points."""
+    """Number of compact equations without content: of contacts that are not kept, and of sheets of fewer than three
+    points.
+    """
     said = np.where(kept, np.minimum(np.diff(find_contact_pattern(assembly).begin), 3), 0)
     return int((3 - said).sum())
 
 
 def _deviation(C: Array, direction: Direction) -> float:
-    """The standard deviation along a direction, given the covariance of the body twist, (6, 6): [m] or [rad]."""
+    """The standard deviation along a direction, [m] or [rad], given the covariance of the body twist, (6, 6)."""
     half = slice(3, 6) if direction.turns else slice(0, 3)
     return float(np.sqrt(direction.axis @ C[half, half] @ direction.axis))
 
 
 def _too_many(n: int) -> InputError:
+    """The error for more operations than can be explained."""
     return InputError(
         f"{n} operations were given; up to {LARGEST_POSTERIOR // 6} can be explained, so take fewer of them."
     )
 
 
 def _own_directions(known: Freedom, n: int) -> Iterator[Array]:
-    """The free directions of each operation, (6 n, f_k), orthonormal in its own block, with what must go along.
+    """The free directions of each operation, (6 n, f_k), orthonormal in the block of that operation.
 
-    One operation after the other is held fast; what goes along is the least, in standard deviations.
+    The other blocks are the smallest motion, in standard deviations, with which later operations adapt. Earlier
+    operations stay fixed.
     """
     left = known.free
     for k in range(n):
@@ -230,11 +239,16 @@ def _own_directions(known: Freedom, n: int) -> Iterator[Array]:
         _, w, Vt = np.linalg.svd(left[6 * k : 6 * k + 6], full_matrices=True)
         count = int(np.count_nonzero(w > _ZERO))
         yield left @ (Vt[:count].T / w[:count])
-        left = left @ Vt[count:].T
+        left = left @ Vt[count:].T  # what remains free once operation k is fixed
 
 
 def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...]:
-    """The later operations that move if operation k moves in one of its free directions."""
+    """The later operations that must move if operation k moves in one of its free directions.
+
+    Args:
+        own: Its free directions, as `_own_directions` yields them.
+        B: (6, 6), the body twist at its pose per unit of z.
+    """
     # The twist as a combination of the operation's own free directions, which take later operations along.
     share = np.linalg.lstsq(B @ own[6 * k : 6 * k + 6], direction.twist, rcond=None)[0]
     moved = np.linalg.norm((own @ share).reshape(-1, 6), axis=1)
@@ -242,7 +256,12 @@ def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...
 
 
 def _standing(assembly: Assembly, start: Poses, poses: Array, B: Array, spans: Array) -> tuple[PartExplanation, ...]:
-    """Every part that was moved, at the end; its pose is a product of poses, so errors go through all of them."""
+    """The explanation of every moved part at the end; its pose is a product of poses, so errors of all of them add up.
+
+    Args:
+        B: (n, 6, 6), the body twist of each pose per unit of z.
+        spans: (n, 6, f), factor of the joint posterior covariance of the body twists.
+    """
     if not len(assembly):
         return ()
     final = compute_placements(assembly, start, poses)[-1]
@@ -267,9 +286,13 @@ def _standing(assembly: Assembly, start: Poses, poses: Array, B: Array, spans: A
 
 
 def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:
-    """What the body twist of each pose makes of that of a product of poses, (6, n, 6).
+    """The derivative of the body twist of a product of poses by the body twist of each pose, (6, n, 6).
 
     T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
+
+    Args:
+        word: The product.
+        stack: The poses, (constants + n, 4, 4): start poses, then those of operations.
     """
     behind = np.eye(4)
     reach = np.zeros((n, 6, 6))

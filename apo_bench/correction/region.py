@@ -1,4 +1,4 @@
-"""Is the truth in the region that a correction states? For benchmarks and tests, which know the truth."""
+"""Coverage check for benchmarks and tests: whether the truth lies in the confidence region of a correction."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,11 @@ from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 
 def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
-    """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
+    """Whether the true poses, (n, 4, 4), lie in the `level` region of the posterior of a correction.
 
-    Of a correction with hypotheses it is the union of regions of the likeliest of them: of so many that one of them is
-    right with the root of `level`, and with the root of `level` each contains the truth if it is right. Elsewhere it is
-    the one region of the correction.
+    With hypotheses the region is a union: the most likely hypotheses up to a total weight of sqrt(level), each with its
+    own region at sqrt(level). So the truth lies in it with probability `level`. Otherwise it is the single region of
+    the correction.
 
     Returns:
         None if the correction states no posterior, did not converge, or nothing is free.
@@ -37,10 +37,10 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
 
 
 def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], truth: Array, level: float) -> bool | None:
-    """The same of the poses that what is assumed leads to.
+    """The same for one set of poses and the observation assumed for it.
 
-    The region is taken in the tangent space of the contact manifold at the corrected poses: the squared length of the
-    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
+    The region lies in the tangent space of the contact manifold at the poses. The squared length of the deviation
+    there, in standard deviations, is chi-square distributed with as many degrees of freedom as directions are free.
     """
     from scipy.special import chdtri
 
@@ -61,6 +61,6 @@ def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], trut
 
 
 def _equal(observation: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-    """The contacts that were equations, (c,): neither inequalities nor left out."""
+    """The contacts that were equations, (c,): neither inequalities nor dropped."""
     low, high = observation.assembly.intervals(observation.play_m).T
     return np.asarray(low == high) & observation.assembly.without(dropped)

@@ -1,8 +1,8 @@
-"""Which relations hold a part: the fewest that leave it as free as all of them do.
+"""Minimal sets of relations that fix an operation as much as all relations together do.
 
-Relations are taken in by their distance in the graph of operations and relations until the operation is held as well
-as by all of them; then the farthest and latest that are not needed are left out again, one by one. What remains is
-irreducible: without any one of them the part would be freer.
+Relations are added in order of their distance from the operation in the graph of operations and relations, until the
+rank is reached. Then those that are not needed are removed, farthest and latest first. The result is irreducible:
+without any one of its relations the part would be freer.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from apo_bench.geometry import Array
 @final
 @dataclass(frozen=True)
 class RelationHold:
-    """A relation that holds a part, and by which operations."""
+    """A relation with its history, as one that fixes a part."""
 
     relation: str
     """R1, R2, ... as in the relation graph."""
@@ -34,7 +34,7 @@ class RelationHold:
     lost: int | None
     """The operation at which it disappeared, or None while it stands."""
     word: ODL
-    """The product D_a^-1 D_b in its equations (Eq. 26); constant poses are left out."""
+    """The product D_a^-1 D_b in its equations (Eq. 26), without start poses."""
 
 
 def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
@@ -53,20 +53,20 @@ def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
 @final
 @dataclass(frozen=True, eq=False)
 class RelationEquations:
-    """The equations of an assembly by relation, ready to be left out."""
+    """The Jacobian of an assembly, grouped by relation."""
 
     Jt: Array
-    """(6 n, 3 c): the transposed Jacobian at a solution."""
+    """(6 n, 3 c): the transposed Jacobian at a solution; columns of contacts that are left out are zero."""
     arcs: tuple[tuple[int, ...], ...]
-    """The contacts of each relation."""
+    """The contacts of each relation, numbers in `relations()`."""
     operations: tuple[frozenset[int], ...]
-    """The operations in the equations of each relation."""
+    """The operations that occur in the equations of each relation."""
 
     def rank(self, k: int, some: Sequence[int]) -> int:
-        """Directions of operation k that these relations fix, if earlier operations stay and later ones adapt.
+        """Number of directions of operation k that some relations fix, if earlier operations are fixed and later ones
+        adapt.
 
-        The null space of the columns from k on has as many dimensions in block k as it has more than that of the
-        columns behind k.
+        It is the rank of the columns of operation k and later ones, minus the rank of the columns of later ones.
         """
         later = sorted({j for i in some for j in self.operations[i] if j > k})
         rows = [3 * c + i for arc in some for c in self.arcs[arc] for i in range(3)]
@@ -74,7 +74,9 @@ class RelationEquations:
         return _rank(np.concatenate([self._blocks([k])[:, rows], behind])) - _rank(behind)
 
     def holding(self, k: int, rank: int) -> tuple[int, ...]:
-        """An irreducible set of relations that fix `rank` directions of operation k, the nearest preferred."""
+        """An irreducible set of relations that fixes `rank` directions of operation k; relations near to it come
+        first.
+        """
         order = [i for ring in self._rings(k) for i in ring]
         count = next((m for m in range(len(order) + 1) if self.rank(k, order[:m]) >= rank), len(order))
         kept = order[:count]
@@ -89,7 +91,9 @@ class RelationEquations:
         return tuple(i for i, operations in enumerate(self.operations) if k in operations)
 
     def _rings(self, k: int) -> list[list[int]]:
-        """Relations by their distance from operation k, through operations that are not earlier."""
+        """Relations grouped by distance from operation k in the graph, through operations that are not earlier than
+        k.
+        """
         reached = {k}
         left = set(range(len(self.arcs)))
         rings = list[list[int]]()
@@ -100,11 +104,18 @@ class RelationEquations:
         return rings
 
     def _blocks(self, operations: Sequence[int]) -> Array:
+        """The rows of the transposed Jacobian of some operations, (6 m, 3 c)."""
         return self.Jt[[6 * j + i for j in operations for i in range(6)]]
 
 
 def by_relation(assembly: Assembly, system: CompactEquations, Jt: Array, kept: NDArray[np.bool_]) -> RelationEquations:
-    """Group the equations of all contacts, in the order of `assembly.relations()`; those not `kept`, (c,), are void."""
+    """Group the equations of all contacts by relation.
+
+    Args:
+        system: The equations of all contacts, in the order of `assembly.relations()`.
+        Jt: (6 n, 3 c), their transposed Jacobian.
+        kept: (c,): the contacts that count.
+    """
     arcs = assembly.arcs()
     contact, letter = system.words.incidence
     known = system.words.operation[letter]
@@ -113,6 +124,7 @@ def by_relation(assembly: Assembly, system: CompactEquations, Jt: Array, kept: N
 
 
 def _rank(Jt: Array) -> int:
+    """The numerical rank at a solution."""
     if not Jt.size:
         return 0
     w = np.linalg.svd(Jt, compute_uv=False)

@@ -1,4 +1,4 @@
-"""The errors that operations share, estimated with a correction: how far a camera is off, and how certain that is."""
+"""Estimates of errors that operations share, such as a camera offset, given a correction."""
 
 from dataclasses import dataclass
 from typing import final
@@ -20,13 +20,13 @@ from apo_bench.geometry import Array, pose
 @final
 @dataclass(frozen=True, eq=False)
 class SharedEstimate:
-    """What is known of one shared error after a correction."""
+    """The estimate of one shared error."""
 
     error: SharedError
     twist: Array
-    """(6,), [m, rad], in its frame: how far what was observed is off, the opposite of what takes it to the truth."""
+    """(6,), [m, rad], in its frame: the estimated error of the observation, the opposite of what leads to the truth."""
     covariance: Array
-    """(6, 6), posterior, of that."""
+    """(6, 6), posterior covariance of `twist`."""
 
     @property
     def deviations(self) -> Array:
@@ -37,19 +37,19 @@ class SharedEstimate:
 def estimate_shared(
     observation: Observation, xi: Array, Jr: Array, system: CompactEquations
 ) -> tuple[tuple[SharedEstimate, ...], Array]:
-    """The errors that are one and the same in several operations, and how uncertain all poses are together.
+    """Estimate the errors that operations share, and the joint uncertainty of all poses.
 
-    Shared error c and body twists xi are jointly Gaussian, cov(c, xi_k) = C A_k^t: given the corrected twists, c has
-    the mean K xi and the covariance C - K A C, K = C A^t S^-1, to which comes what is uncertain of the twists.
+    Shared error c and body twists xi are jointly Gaussian, cov(c, xi_k) = C A_k^t. Given the corrected twists, c has
+    the mean K xi and the covariance C - K A C, with K = C A^t S^-1. The uncertainty of the twists themselves is added.
 
     Args:
-        xi: (n, 6), the body twists from what was observed to the corrected poses, [m, rad].
+        xi: (n, 6), the body twists from the observed to the corrected poses, [m, rad].
         Jr: (n, 6, 6), their right Jacobians.
         system: The equations that hold.
 
     Returns:
-        One estimate for each shared error that is no mere correlation, and (n, 6, f) of which the products with
-        themselves are the posterior covariances of the body twists at the corrected poses.
+        One estimate for each shared error that is no mere correlation. And a factor F, (n, 6, f), of the posterior: F_k
+        F_l^t is the covariance of the body twists of corrected poses k and l.
 
     Raises:
         InputError: Too many operations.

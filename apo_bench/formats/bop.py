@@ -99,7 +99,12 @@ def check_rows(rows: PoseRows) -> PoseRows:
 
 
 def _row(text: str, place: str) -> list[float]:
-    """Return scene, image, object, score, the twelve numbers of R and t, and the time of one line."""
+    """Return scene, image, object, score, the twelve numbers of R and t, and the time of one line.
+
+    Args:
+        text: The line.
+        place: Its location, for messages.
+    """
     cells = text.split(",")
     require(len(cells) == len(_COLUMNS), f"{place}: {len(_COLUMNS)} cells are needed, {len(cells)} were given.")
     try:

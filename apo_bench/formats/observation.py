@@ -89,7 +89,11 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
 
 
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
-    """Return the nominal poses of a scenario as an observation with these standard deviations per axis."""
+    """Return the nominal poses of a scenario as an observation with these standard deviations per axis.
+
+    Args:
+        deviation_mm, deviation_deg: Along and about each axis.
+    """
     check_deviations(deviation_mm, deviation_deg)
     layout = place_layout(scenario, 0.0, 0.0, 0.0)
     n = len(scenario.assembly)

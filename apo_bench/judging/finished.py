@@ -26,13 +26,10 @@ def judge_finished(
     """Judge the final state: contacts, penetration, nothing held, nothing moving, and no part displaced after placing.
 
     Only contacts that exist at the end are required. For each part, its symmetry nearest in rotation to the true final
-    pose
-    counts, for all of its contacts. With a fixed part only the area of the overlap counts, so an assembly that is right
-    in
-    itself may stand elsewhere on the table. Between movable parts the overlap has its place on the environment face.
-    Fixtures may end anywhere. Displacements by `faults_of_place` are at most `placed_part_shift_mm`. Every operation
-    must
-    have ended.
+    pose counts, for all of its contacts. With a fixed part only the area of the overlap counts, so an assembly that is
+    right in itself may stand elsewhere on the table. Between movable parts the overlap has its place on the environment
+    face. Fixtures may end anywhere. Displacements by `faults_of_place` are at most `placed_part_shift_mm`. Every
+    operation must have ended.
 
     Args:
         reached: Snapshots with finite poses.
@@ -64,16 +61,15 @@ def fixtures(assembly: Assembly) -> frozenset[str]:
     """The fixtures of an assembly: parts that were used and then put away.
 
     The last operation of a fixture breaks its last contacts with movable parts and makes contacts with fixed parts
-    only. A
-    part that ends against a movable part is no fixture, even if that part leaves later.
+    only. A part that ends against a movable part is no fixture, even if that part leaves later.
     """
     relations = assembly.relations()
     return frozenset(part for part, k in last_moves(assembly).items() if _put_away(assembly, relations, part, k))
 
 
 def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
-    # contacts of the part
     """Whether operation k, the last of a part, puts that part away."""
+    # contacts of the part
     mine = [relation for relation in relations if part in {end.part for end in relation.contact}]
     movable = [relation for relation in mine if not _on_fixed(assembly, relation.contact)]
     breaks = any(relation.lost == k for relation in movable)
@@ -113,9 +109,10 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
     common = Meetings(assembly).measure_overlaps(
         ((c, at) for each in (seen, true) for at in list_alternatives(each) for c, _ in contacts),
     )
+    # first half: at `seen`, second half: at `true`
     reached, expected = common[: len(common) // 2], common[len(common) // 2 :]
     covered = compute_covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
-    covered[[not overlap for overlap in expected]] = np.nan
+    covered[[not overlap for overlap in expected]] = np.nan  # the truth itself has no overlap
     return np.asarray(covered.reshape(count, -1).min(axis=1, initial=1.0))
 
 

@@ -34,6 +34,7 @@ def _choose_later(module: ModuleType, source: ModuleType) -> None:
     vars(module).pop(wanted, None)
 
     def chosen(name: str) -> Any:
+        """The module's `__getattr__` for missing attributes (PEP 562)."""
         if name != wanted:
             raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")
         if name not in vars(source):

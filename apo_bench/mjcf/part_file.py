@@ -178,6 +178,7 @@ def _geom(geom: Any, corners: Mapping[str, Array], path: Path) -> PartGeom:
 
 
 def _site(site: Any) -> PartSite:
+    """Convert a site of a part file to a `PartSite`."""
     return PartSite(
         name=site.name,
         pos=np.array(site.pos),

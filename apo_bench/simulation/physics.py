@@ -1,11 +1,9 @@
 """Physics settings of all simulations, with the reason for each value.
 
 Time step and contact stiffness decide verdicts at the limit of the clearance, so they belong together: the time
-constant
-of a contact is four steps, its damping ratio 2. With a ratio of 1 a stick rocks in its slot forever at 1 to 5 mm/s in
-some perfect assemblies, with 1.5 still in 3 of 100. With a time constant of two steps a misaligned stick rattles over
-an
-edge that should stop it.
+constant of a contact is four steps, its damping ratio 2. With a ratio of 1 a stick in some perfect assemblies rocks in
+its slot forever at 1 to 5 mm/s, with 1.5 still in 3 of 100. With a time constant of two steps a misaligned stick
+rattles over an edge that should stop it.
 """
 
 from collections.abc import Iterable

@@ -73,7 +73,7 @@ def record_misbehaviour(config: TrialConfig, content: str, demonstration: str, w
         demonstration: Code of the demonstration, `ok` or why it failed.
         why: The error; addresses of objects, which differ from run to run, are masked.
     """
-    # encoding masks lone surrogates, which no file can hold
+    # Encoding replaces lone surrogates, which no file can hold.
     why = _ADDRESS.sub("0x...", why.encode(errors="replace").decode())
     return _record_failure(config, content, demonstration, Outcome("correct", "raised", None, why))
 

@@ -55,8 +55,7 @@ def config_hash(config: TrialConfig, content: str, observation: str = "") -> str
     """16 hexadecimal digits over the content and every setting except method, seed and the path of the scenario.
 
     Records with equal hashes differ in method and seed alone, so they may be pooled or paired. Noise models from files
-    and
-    plugins (noise, contact source, arm) count by the content of their files, a secret seed by its hash.
+    and plugins (noise, contact source, arm) count by the content of their files, a secret seed by its hash.
 
     Args:
         content: From `content_hash`.

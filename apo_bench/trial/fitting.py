@@ -24,7 +24,7 @@ from apo_bench.trial.free_directions import free_space, nearest_fitting
 ROOMS_MM = (2.0, 0.5)
 """Distances to keep between parts, and of the centre of mass from an edge; the second is tried if the first fails."""
 _SLACK = 0.01
-"""Where the plan has less room than wanted, it may lose this much of it [mm]."""
+"""Room that a plan with less than the wanted room may still lose [mm]."""
 _ROOMY = ("on_way", "from_above")
 """Kinds of measures that are distances between parts."""
 _EXACT_M = 1e-9
@@ -65,7 +65,7 @@ class FittingPlan:
             return ""
         mains = [operation.main for operation in self.plan.assembly.operations]
         named = [
-            # A boolean factor leaves out rotations that print as 0.0.
+            # The boolean factor omits rotations that would print as 0.0.
             f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm" + f" and {turn_deg:.1f} deg" * (turn_deg >= 0.05)
             for k, shift_mm, turn_deg in self.moves
         ]
@@ -138,11 +138,12 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
     allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
+        """Whether contacts hold as well as before, also those broken later, and nothing is predicted to fail."""
         moved = plan.with_target_poses(goals)
         held = all(
             (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
         )
-        return held and _fault(scene, moved) is None  # contacts hold as well as before, and nothing fails
+        return held and _fault(scene, moved) is None  # None: nothing fails
 
     for room_mm in ROOMS_MM:
         limits = _limits(before, _measured(scene, plan, room_mm), room_mm)
@@ -161,8 +162,7 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
     """The limit of each measure, (k,), [mm].
 
     Distances between parts must be at least `room_mm`. Where the plan has less and does not fail, it must keep what it
-    has.
-    The same holds for the balance of a part.
+    has. The same holds for the balance of a part.
 
     Args:
         before: The measures of the plan.
@@ -181,6 +181,7 @@ def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact, [m], one array for each time before parts are taken apart again."""
     return [
         build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        # The last entry is the end of the plan; the search itself keeps those contacts.
         for upto, goals in list_poses_in_force(plan)[:-1]
     ]
 

@@ -1,12 +1,10 @@
 """Search the free directions of a plan for the nearest target poses at which the plan fits.
 
-Free directions are the null space of the contact equations at the target poses, scaled by standard deviations of the
-observation, so a shorter vector is a likelier plan. What fails is linearised, and the shortest vector that repairs it
-is
-taken; this repeats until nothing fails (least distance problems: Lawson and Hanson, "Solving Least Squares Problems",
-23). If that does not converge, the search restarts at evenly spread points. A point that fits is then moved back
-towards
-the start as far as it fits. After each move the poses are projected back onto all contacts.
+Free directions are the null space of the contact equations at the target poses. They are scaled by standard deviations
+of the observation, so a shorter vector is a likelier plan. Failures are linearised, and the shortest vector that
+repairs them is taken; this repeats until nothing fails (least distance problems: Lawson and Hanson, "Solving Least
+Squares Problems", 23). If that does not converge, the search restarts at evenly spread points. A point that fits is
+then moved back towards the start as far as it fits. After each move the poses are projected back onto all contacts.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,7 +38,7 @@ _TURNS = 5
 _STEP = 0.05
 """Step of the finite differences, in standard deviations."""
 _BEYOND = 0.05
-"""Excess below zero that a linearised repair aims at, since measures are nonlinear [mm]."""
+"""Margin below the limit at which a linearised repair aims, since measures are nonlinear [mm]."""
 _HALVINGS = 6
 """Bisections on the way back from a point that fits."""
 _EXACT_M = 1e-9
@@ -145,6 +143,7 @@ def even_points(dimensions: int) -> Iterator[Array]:
     for _ in range(30):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1.0)
+    # multiples of the steps modulo 1, mapped to normal quantiles
     points = norm.ppf((0.5 + np.arange(1, _TRIED + 1)[:, None] * steps) % 1.0)
     yield from points[np.argsort((points * points).sum(axis=1), kind="stable")]
 
@@ -193,8 +192,7 @@ class _Search(NamedTuple):
     def nearer(self, far: Array) -> Array:
         """A point that fits and is nearer to 0 than `far`, which fits.
 
-        Bisection on the line to 0 gives the last point that fits. A new search starts from the nearest point on the
-        line that
+        Bisection on the line to 0 gives the last point that fits. A new search starts just beyond it, where the plan
         does not fit; its result is taken if it is nearer.
         """
         inside = 1.0
@@ -211,7 +209,7 @@ class _Search(NamedTuple):
         """(G, h) so that each measure in excess at s is repaired to first order where G s' >= h."""
         # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
         now = self.excess(self.space.tangent(s))
-        over = now > 0.0
+        over = now > 0.0  # only measures in excess are linearised
         ends = [self.excess(self.space.tangent(s + _STEP * axis))[over] for axis in np.eye(len(s))]
         G = -(np.array(ends).T - now[over][:, None]) / _STEP
         return G, G @ s + now[over] + _BEYOND

@@ -34,9 +34,8 @@ def content_pieces(
 ) -> dict[str, str]:
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
-    The inputs: the scenario (its file, or its values if there is none), each part with its files, the files of the arm,
-    the
-    room, the weights of networks, the judge's thresholds.
+    Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
+    the weights of networks, and the judge's thresholds.
 
     Args:
         source: The scenario as given to `load_scenario`.
@@ -112,7 +111,7 @@ def module_files(module: str) -> tuple[Path, ...]:
     spec = find_spec(top) or find_own_module(top)
     if spec is None or not spec.has_location or spec.origin is None:
         return ()
-    # of a package one folder above its own
+    # The folder that holds the module: parents[0] of a file, parents[1] of the `__init__.py` of a package.
     home = Path(spec.origin).parents[spec.submodule_search_locations is not None]
     others = ["apo_bench"]
     if home in {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}:

@@ -141,7 +141,7 @@ def _probing(found: ProbingResult | None) -> TrialRecord:
 
 
 def _slip(each: SlipInHand) -> GraspSlip:
-    """How far a part had moved in the hand when its last motion began (`carried_*`), and at release; mm and degrees."""
+    """Slip of a part in the hand, in mm and degrees: until its last motion began (`carried_*`), and until release."""
     return {
         "operation": each.operation + 1,
         "carried_mm": 1e3 * each.carried_m,

@@ -13,8 +13,7 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
     """The warnings about a plan in one sentence; empty if there are none.
 
     For example: `the stated noise does not explain the correction (p = 0.0004); predicted: operation 3 (stick) will
-    fail:
-    ..`.
+    fail: ..`.
 
     Args:
         correction: What the corrector returned; None without a corrector.

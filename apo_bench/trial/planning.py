@@ -27,7 +27,7 @@ class MethodResult:
     gap_after_m: float
     """Largest contact gap of the plan; not a number without one."""
     correction: Correction | None = None
-    """What the corrector returned; None without a corrector."""
+    """The result of the corrector; None without a corrector."""
     fitting: FittingPlan | None = None
     """The moves of the plan along free directions; None unless a corrector made the plan."""
 
@@ -48,8 +48,7 @@ def apply_method(
         truth: (n, 4, 4) poses of the layout, world frame, [m]; only the oracle reads them.
         reobserve: Lets a corrector observe operations again; None: it cannot.
         where: Scene or scenario of the execution, in which the plan of a corrector must fit (`fit_plan`). None: the
-            plan
-            stays as the corrector made it.
+            plan stays as the corrector made it.
     """
     if isinstance(method, str):
         if method == "oracle" and truth is not None:

@@ -28,12 +28,9 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     """Root mean square per operation of the error of target poses, in fixed and in free directions, [mm].
 
     The error of an operation is the body twist from the true pose to the given one. A rotation counts by the motion of
-    a
-    point 40 mm from the origin. The rotation of a part of revolution about its axis is no error, unless the part
-    carries
-    others. The row space of the Jacobian of the contact equations at the truth holds the fixed directions, its null
-    space
-    the free ones.
+    a point 40 mm from the origin. The rotation of a part of revolution about its axis is no error, unless the part
+    carries others. The row space of the Jacobian of the contact equations at the truth holds the fixed directions, its
+    null space the free ones.
 
     Args:
         assembly: With the right relations.

@@ -4,8 +4,7 @@ Every explanation that a corrector kept states possible true poses. Truths are d
 proportion to their weights, along directions that contacts leave free. Robots are drawn from the stated robot errors.
 Each draw measures how far the plan is from failing: whether the placed parts fit (the measures of `prediction`), and
 whether faces overlap as the judge requires if that draw is the truth. The mean over the draws is the *score*. A table
-of
-other assemblies gives the share of plans with such a score that succeeded.
+of other assemblies gives the share of plans with such a score that succeeded.
 
 The simulator only provides the scene, the reach of its arm, and the poses to which a robot with errors brings parts.
 """
@@ -93,7 +92,7 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     if not correction.hypotheses:
         return (PossibleTruth(1.0, correction.assumed or believed, correction.poses, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
-    # spreads the weight of ignored explanations
+    # Factor that gives the weight of ignored explanations to the likely ones.
     share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
     return tuple(PossibleTruth(share * each.weight, each.assumed, each.poses, each.dropped, blind) for each in likely)
 
@@ -214,8 +213,9 @@ def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator
 
 def _widths(space: FreeSpace) -> Array:
     """Standard deviation of draws along free directions, (f,), relative to the stated one, bounded by `_FARTHEST_*`."""
+    # largest translation of an operation, (f,)
     far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
-    turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
+    turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD  # largest rotation
     return np.asarray(1.0 / np.maximum(1.0, np.maximum(far, turned)))
 
 
@@ -249,6 +249,7 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
         ends: From `_by_arm`; empty: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
+    # |cosine| of each insertion axis with the vertical
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
     # per operation, for `_within`
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]

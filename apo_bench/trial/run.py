@@ -213,8 +213,11 @@ def _plan_and_replay(
         if predicted_success < config.min_predicted_success:
             record = end_record(abstain(predicted_success, config.min_predicted_success), success=False)
         else:
-            # The robot executes poses only, so replay and judge use the true contacts, not those of the planner.
-            record = _replay(context, replace(planned.plan, assembly=observation.assembly), observation, truth)
+            plan = planned.plan
+            if plan.assembly is not observation.assembly:
+                # The robot executes poses only, so replay and judge use the true contacts, not those of the planner.
+                plan = replace(plan, assembly=observation.assembly)
+            record = _replay(context, plan, observation, truth)
         record |= {"failure_prediction": prediction, "predicted_success": predicted_success}
     record |= method_columns(planned) | confidence_columns(planned, observation, given, truth)
     if planned.correction is not None:

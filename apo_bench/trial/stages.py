@@ -208,8 +208,7 @@ def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...
     """Scale standard normal numbers to robot errors.
 
     The base is rotated about the mean of the nominal target poses. A part slips along the pads (second and third axis
-    of
-    the tip) and rotates about their normal (first axis).
+    of the tip) and rotates about their normal (first axis).
 
     Args:
         name: Standard deviations, as in a record.
@@ -244,8 +243,7 @@ def replay_and_judge(
 
     Args:
         reference: (n, 4, 4) right target poses, world frame, [m]; the judge takes from them how faces should overlap,
-            how
-            far apart they may be, and which of the symmetries of a part is meant.
+            how far apart they may be, and which of the symmetries of a part is meant.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         config: How the robot executes the plan.
         cache: As in `replay`.

@@ -80,7 +80,10 @@ def _faces_oppose(problem: Problem, *poses: Array) -> bool:
 
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
-    """Whether contacts also hold with vertices projected at the solution: edge-on faces could satisfy the equations."""
+    """Whether contacts also hold with vertices projected at the solution.
+
+    Vertices that were projected onto a face observed edge-on lie on one line and constrain too little.
+    """
     return find_largest_residual(_begun_at(problem, solved.poses).gaps(solved.poses[None])) <= problem.observation.gap_m
 
 

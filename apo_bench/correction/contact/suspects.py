@@ -55,7 +55,7 @@ def _rank(
 ) -> tuple[Suspect, ...]:
     """Leave out each named group of contacts in turn and rank the groups, the most suspect first.
 
-    The order is by p-value, and where that underflows by the normalised excess of chi-square.
+    The order is by p-value; where that underflows, by the normalised excess of chi-square.
     """
     relations = problem.observation.assembly.relations()
     ranked = list[Suspect]()

@@ -1,4 +1,4 @@
-"""Solvers of the contact equations, and by how much play lets these equations be off."""
+"""Solvers of the contact equations, and models of how far play lets these equations be off."""
 
 from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import (

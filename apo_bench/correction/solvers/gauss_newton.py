@@ -30,51 +30,53 @@ from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry import Array
 
 MOST_ITERATIONS = 60
+"""Most iterations."""
 STEP = 1e-7
-"""The solver rests after a step that is shorter in every component, in standard deviations."""
+"""The solver has converged after a step whose components are all below this, in standard deviations."""
 DAMPING = 0.05
-"""mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
+"""Factor of mu, relative to the mean square of the rows of J times that of the gaps in this unit."""
 FALL = 0.3
-"""mu is at most `DAMPING` times this to the number of iterations, so that it cannot hold a gap open."""
+"""mu is at most `DAMPING` times this to the power of the iteration, so that it cannot hold a gap open."""
 SQUARED_GAP_FLOOR = 1e-14
-"""mu is at least this part of the mean square of the rows: rounding."""
+"""Least mu, as a fraction of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
-"""[rad]. No pose is rotated further in one step."""
+"""Largest rotation of a pose in one step, [rad]."""
 LARGEST_DENSE = 72
-"""Unknowns above which one observation is solved with sparse matrices."""
+"""Number of unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
+"""Least positive divisor."""
 
 
 class NearestPoses(NamedTuple):
-    """The result of the solver: of each observation of a batch, (b, ..), or of one."""
+    """Result of the solver, for a batch of observations, (b, ..), or for one."""
 
     poses: Array
-    """(*, n, 4, 4); the seen ones, if a number was not finite on the way."""
+    """(*, n, 4, 4); the observed ones if a number was not finite on the way."""
     z: Array
     """(*, 6 n): the correction in standard deviations."""
     e: Array
-    """(*, 3 c): what is left of every compact equation, [m]."""
+    """(*, 3 c): the residual of every compact equation, [m]."""
     Jt: Any
     """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]; of many operations, a sparse matrix of SciPy."""
     B: Array
-    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected pose k: J_r(xi) L, [m, rad]; where
-    operations share errors (n, 6, 6 n), of all of z."""
+    """(*, n, 6, 6): derivative of the body twist at corrected pose k by z_k, J_r(xi) L, [m, rad]; (n, 6, 6 n), by all
+    of z, if operations share errors."""
     at_rest: NDArray[np.bool_]
-    """(*,)."""
+    """(*,): whether the solver converged."""
     finite: NDArray[np.bool_]
-    """(*,)."""
+    """(*,): whether all numbers stayed finite."""
     forms: Array
-    """(*, c, 4): n D_a^-1 D_b of each contact: e of any vertex is this times it."""
+    """(*, c, 4): n D_a^-1 D_b of each contact; e of any vertex is its product with the vertex."""
     trace: Sequence[Any]
-    """The iterations, of a batch those of each observation: the largest |e| of the compact equations before it, [m],
-    and the largest component of its step, in standard deviations."""
+    """One entry per iteration (of each observation of a batch): the largest |e| of the compact equations before the
+    step, [m], and its largest component, in standard deviations."""
 
     def at(self, i: int) -> NearestPoses:
-        """Those of one observation of a batch."""
+        """The result of observation i of a batch."""
         return NearestPoses(*[x[i] for x in self])
 
     def batch(self) -> NearestPoses:
-        """Those of one observation as a batch."""
+        """The result of one observation as a batch of one."""
         fields: list[Any] = [[x] if hasattr(x, "nnz") else np.asarray(x)[None] for x in self[:-1]]
         fields.append([self.trace])
         return NearestPoses(*fields)
@@ -87,14 +89,14 @@ def find_nearest_poses(
     soft_m: Array | None = None,
     begin: Array | None = None,
 ) -> NearestPoses:
-    """Change all poses as little as the contacts ask for.
+    """Find the most likely poses that satisfy the contact equations.
 
     Args:
-        poses: (n, 4, 4), or (b, n, 4, 4), what was observed, world frame, [m].
+        poses: (n, 4, 4), or (b, n, 4, 4), the observed poses, world frame, [m].
         L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad]; or (*, n, 6, 6 n), of all of them together.
-        soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
-            that are demanded, and |z|^2 + |e / soft_m|^2 is least.
-        begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
+        soft_m: Standard deviation of every equation, (3 c,), [m], 0 if it must hold: minimises |z|^2 + |e / soft_m|^2.
+            None: all must hold.
+        begin: (*, 6 n), the correction to start from, in standard deviations; None: none.
     """
     if poses.ndim == 4:
         L = np.broadcast_to(L, (len(poses), *L.shape[-3:]))
@@ -111,10 +113,10 @@ def solve_batch(
     begin: Array | None = None,
     sparse: bool | None = None,
 ) -> NearestPoses:
-    """`find_nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
+    """`find_nearest_poses` for a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
 
     Args:
-        sparse: Whether matrices are sparse, of a batch of one without shared errors; None leaves that to its size.
+        sparse: Whether to use sparse matrices, for a batch of one without shared errors; None: depends on the size.
     """
     b = len(observed)
     unknowns = 6 * system.n
@@ -130,10 +132,10 @@ def solve_batch(
 
 
 def _nearest(step: LinearStep, z: Array) -> NearestPoses:
-    """The loop. Observations that rest are left alone while the others, those of number `going`, go on.
+    """Iterate until all observations converge; converged ones stay unchanged while the others (`going`) continue.
 
     Args:
-        z: (b, 6 n), where to begin; overwritten.
+        z: (b, 6 n), the start; overwritten.
     """
     b = len(z)
     traces = [list[tuple[float, float]]() for _ in range(b)]
@@ -181,14 +183,14 @@ def _nearest(step: LinearStep, z: Array) -> NearestPoses:
 
 
 def damping(row_size: float, gap2: float, most: float) -> float:
-    """mu, which is added to the diagonal of J J^t.
+    """The damping mu that is added to the diagonal of J J^t.
 
     Args:
         row_size: The mean square of the rows of J.
-        gap2: The mean square of what the equations that are demanded leave.
-        most: What gap2 counts at most, per `row_size`.
+        gap2: The mean square of the residuals of the equations that must hold.
+        most: Upper limit of gap2 / row_size.
     """
-    # `max` and `min` of two numbers, spelled out: quicker.
+    # Conditional expressions instead of `max` and `min`, which are slower for two numbers.
     size = row_size if row_size > SMALLEST else SMALLEST
     gap = gap2 / size
     share = DAMPING * (gap if gap < most else most)
@@ -197,11 +199,14 @@ def damping(row_size: float, gap2: float, most: float) -> float:
 
 
 def settles(size: float, before: float, sure: float = SURE, following: float = NEXT) -> bool:
-    """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor.
+    """Whether the solver has converged: this step is short, or the next one will be.
 
     Args:
-        sure: Steps shorter than this shrink by a constant factor: the solver rests, too, if the next one would be
-            shorter than `following`. Longer ones are not trusted: rounding turns redundant contacts into noise there.
+        size: Largest component of this step, in standard deviations.
+        before: That of the step before.
+        sure: Steps below this shrink by a constant factor. Longer ones are not trusted, since rounding turns redundant
+            contacts into noise there.
+        following: Length of the predicted next step, below which the solver has converged.
     """
     return size < STEP or (size < sure and size * size < following * before)
 

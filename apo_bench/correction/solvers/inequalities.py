@@ -1,9 +1,9 @@
-"""Contacts with play, as inequality constraints: a vertex may be anywhere between two distances from its plane.
+"""Nearest poses with contacts that have play, as inequality constraints on the distances of vertices from planes.
 
-Equations of exact and centred contacts are solved first, which settles their rank. After that every iteration solves a
-quadratic program: the shortest z among all that satisfy the linearised equations and inequalities.
-Redundant equations would make the active-set solver cycle, so z is written as the shortest solution of the equations
-plus a combination of their free directions; only that is the unknown of the program.
+Equations of exact and centred contacts are solved first, which determines their rank. Then every iteration solves a
+quadratic program: the shortest z that satisfies the linearised equations and inequalities. Redundant equations would
+make the active-set solver cycle. So z is the shortest solution of the equations plus a combination of their free
+directions, and only that combination is unknown.
 """
 
 from __future__ import annotations
@@ -24,20 +24,23 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 _BLIND = 1e-7
-"""Part of the largest row below which an inequality does not depend on the free directions."""
+"""Relative size of a row below which an inequality does not depend on the free directions."""
 _EXACT = 1e-10
-"""How far the program may violate an inequality, in standard deviations."""
+"""Largest violation of an inequality by the program, in standard deviations."""
 _ITERATIONS = 200
+"""Most iterations."""
 _SETTLED = FALL**60
-"""The equations are damped as after so many iterations: they hold already."""
+"""Damping of the equations, as after 60 iterations of `gauss_newton`, since they hold already."""
 _SLOWEST = 1.0 / 64.0
+"""Least fraction of a step that is made."""
 _GROWS = 1.05
-"""The least part of a step that is made, and how much larger that part may be than the one before."""
+"""Largest ratio of that fraction to the one of the step before."""
 _TOUCH_M = 1e-9
-"""An inequality is active if a vertex is nearer to its bound."""
+"""Distance of a vertex from its bound up to which an inequality is active, [m]."""
 _HARD = 0
+"""DAQP's code of an inequality that must hold."""
 _SOFT = 8
-"""What DAQP calls an inequality, and one that may be violated."""
+"""DAQP's code of an inequality that may be violated at a cost."""
 
 
 @final
@@ -46,6 +49,7 @@ class Inequalities:
     """m inequalities low <= e <= high, one per vertex."""
 
     system: Equations
+    """The equations whose residuals e are bounded."""
     low: Array
     """(m,), [m]."""
     high: Array
@@ -55,12 +59,12 @@ class Inequalities:
         return len(self.low)
 
     def among(self, contacts: NDArray[np.bool_]) -> Inequalities:
-        """The inequalities of some of the contacts that have any."""
+        """The inequalities of the chosen contacts, out of those that have any."""
         rows = contacts[self.system.contact]
         return Inequalities(self.system.among(contacts), self.low[rows], self.high[rows])
 
     def overstepped(self, poses: Array) -> Array:
-        """By how much the worst vertex of each contact is beyond its bounds at the poses, [m]; 0 if none is."""
+        """The largest violation of the bounds of each contact at the poses, [m]; 0 if none is violated."""
         e = self.system.residual(poses)
         worst = np.zeros(len(self.system.letters))
         np.maximum.at(worst, self.system.contact, np.maximum(self.low - e, e - self.high))
@@ -68,7 +72,7 @@ class Inequalities:
 
 
 def compute_violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, poses: Array) -> Array:
-    """The largest |e| of each contact that is an equation, (c,), [m]; or how far an inequality is violated."""
+    """The largest |e| of each contact, (c,), [m]; for an inequality its violation."""
     gaps = system.gaps(poses)
     if len(inequalities):
         gaps[~exact] = inequalities.overstepped(poses)
@@ -78,7 +82,9 @@ def compute_violations(system: Equations, exact: NDArray[np.bool_], inequalities
 def list_contact_demands(
     system: Equations, assembly: Assembly, play_m: float
 ) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
-    """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
+    """The equations with shifted planes, (c,) whether each contact is an equation, and the inequalities of the
+    others.
+    """
     low, high = project_round_faces(assembly).intervals(play_m).T
     exact = low == high
     inequalities = bound_contacts(system, exact, low, high)
@@ -90,7 +96,7 @@ def list_contact_demands(
 
 
 def bound_contacts(system: Equations, exact: NDArray[np.bool_], low: Array, high: Array) -> Inequalities:
-    """The inequalities of contacts that are no equations, (c,), between their distances low and high, (c,), [m]."""
+    """The inequalities of the contacts that are no equations, with their least and greatest distances, (c,), [m]."""
     walls = system.among(~exact)
     return Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact])
 
@@ -133,7 +139,7 @@ def find_nearest_between(
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = inequalities.system.linearise(T)
         J_wall = pull_back(J_wall.reshape(len(inequalities), -1), B)
-        # Where walls will be at that z; the program moves on in the free directions alone, z = nearest + free u.
+        # Residuals of the inequalities at that z; the program then moves in the free directions, z = nearest + free u.
         ahead = e_wall + J_wall @ (nearest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = nearest + free @ u - z
@@ -141,7 +147,7 @@ def find_nearest_between(
         trace.append((float(np.abs(e).max(initial=0.0)), largest))
         over = settles(largest, before)
         rest = over and room
-        # All of the step where it is the last, so that equations hold to rounding.
+        # The last step is made in full, so that equations hold to rounding.
         pace = _choose_pace(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
@@ -153,7 +159,7 @@ def find_nearest_between(
 
 
 def _shortest(e: Array, Jt: Array, z: Array) -> Array:
-    """The shortest z that satisfies the linearised equations, (6 n,), damped as if they held."""
+    """The shortest z that satisfies the linearised equations, (6 n,), with little damping."""
     if not len(e):
         return np.zeros(len(z))
     m = len(e)
@@ -162,7 +168,7 @@ def _shortest(e: Array, Jt: Array, z: Array) -> Array:
 
 
 def count_active_directions(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) -> int:
-    """How many directions the active inequalities fix beyond the equations.
+    """Number of directions that the active inequalities fix beyond the equations.
 
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
@@ -174,9 +180,14 @@ def count_active_directions(Jt: Array, inequalities: Inequalities, nearest: Near
 
 
 def _choose_pace(pace: float, step: Array, last: Array) -> float:
-    """The part of a step to make: all of it, but less where inequalities in turn make steps go to and fro.
+    """The fraction of a step to make; below 1 where changing active inequalities make steps oscillate.
 
-    If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).
+    If making the fraction p of the last step left the fraction r of it, making p / (1 - r) would have left nothing
+    (secant rule).
+
+    Args:
+        pace: The fraction of the last step that was made.
+        last: The last step.
     """
     size = float(last @ last)
     if size == 0.0:
@@ -186,14 +197,15 @@ def _choose_pace(pace: float, step: Array, last: Array) -> float:
 
 
 def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, bool]:
-    """The shortest u with low <= J free u <= high, and whether there is one (DAQP: Arnstrom, Bemporad, Axehill, 2022).
+    """The shortest u with low <= J free u <= high, and whether one exists (DAQP: Arnstrom, Bemporad, Axehill, 2022).
 
-    Far from a solution linearised inequalities can leave no room where the inequalities themselves do; then they are
-    violated by as little as can be.
+    Far from a solution the linearised inequalities may be infeasible though the true ones are not; then they are
+    violated as little as possible.
     """
     import daqp
 
-    # Rows of unit length, so that one tolerance in standard deviations holds for all; walls that do not depend on u go.
+    # Rows are scaled to unit length, so that one tolerance in standard deviations holds for all. Inequalities that do
+    # not depend on u are dropped.
     A = J @ free
     size = np.sqrt((A * A).sum(axis=1))
     seeing = size > _BLIND * np.sqrt((J * J).sum(axis=1))

@@ -1,7 +1,7 @@
-"""One linear step of the solver: what differs between dense and sparse matrices.
+"""Interface of one linear step of the solver, and its implementation with dense matrices.
 
-The loop of `gauss_newton` knows no matrices. It asks a step to linearise the contact equations at some z, and for the
-shortest z that satisfies what was linearised.
+The loop of `gauss_newton` is independent of how matrices are stored. It asks a step to linearise the contact equations
+at z, and for the shortest z that satisfies the linearised equations.
 """
 
 from typing import Any, Protocol, final
@@ -13,49 +13,51 @@ from apo_bench.correction.solvers.compact import CompactEquations, linearise_den
 from apo_bench.geometry import Array, compute_exp_and_jacobian
 
 SURE = 1e-6
+"""`sure` of `gauss_newton.settles` for dense matrices."""
 NEXT = 1e-9
-"""When the solver rests with dense matrices: `sure` and `following` of `gauss_newton.settles`."""
+"""`following` of `gauss_newton.settles` for dense matrices."""
 Rows = NDArray[np.intp]
-"""Numbers of observations of a batch."""
+"""Indices of observations in a batch."""
 
 
 class LinearStep(Protocol):
-    """The contact equations of b observations where they were linearised last."""
+    """The contact equations of b observations, linearised at their current z."""
 
     T: Array
-    """(b, n, 4, 4): poses."""
+    """(b, n, 4, 4): the current poses."""
     B: Array
-    """(b, n, 6, 6) or (b, n, 6, 6 n): what a change of z makes of the body twists at T."""
+    """(b, n, 6, 6) or (b, n, 6, 6 n): derivative of the body twists at T by z."""
     e: Array
-    """(b, 3 c), [m]."""
+    """(b, 3 c): residuals, [m]."""
     forms: Array
     """(b, c, 4): n D_a^-1 D_b of each contact."""
     sizes: Array
-    """(3, b): the largest |e|, [m], the mean square of e of the equations that are demanded, that of the rows of J."""
+    """(3, b): the largest |e|, [m]; the mean square of e of the equations that must hold; the mean square of the rows
+    of J."""
     settled: tuple[float, float]
     """`sure` and `following` of `gauss_newton.settles`."""
 
     @property
     def Jt(self) -> Any:
-        """(b, 6 n, 3 c)."""
+        """The transposed derivative of e by z, (b, 6 n, 3 c)."""
 
     def linearise(self, z: Array, rows: Rows) -> None:
-        """Linearise some observations at their z, (b, 6 n)."""
+        """Linearise the observations `rows` at their z; z is that of `rows`."""
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
-        """The step from z, (b, 6 n), of some observations to J^t (J J^t + mu + soft^2)^-1 (J z - e).
+        """The step from z, of the observations `rows`, to J^t (J J^t + mu + soft^2)^-1 (J z - e).
 
         Returns:
-            The step (rows, 6 n), its largest component (rows,), and how far it turns a pose at most (rows,), [rad].
+            The step (rows, 6 n), its largest component (rows,), and its largest rotation of a pose (rows,), [rad].
         """
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
-        """Forget what was linearised of some observations, (b,): poses are those that were observed."""
+        """Reset some observations, (b,), to their observed poses, with J = 0."""
 
 
 @final
 class DenseStep:
-    """Dense matrices; errors may be shared."""
+    """The step with dense matrices; errors may be shared."""
 
     settled = SURE, NEXT
 
@@ -123,22 +125,24 @@ def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
 
 
 def compute_poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
-    """Poses T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
+    """Poses T = T_observed exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
 
     Args:
-        observed: (n, 4, 4) or (b, n, 4, 4); L is (b, n, 6, 6) or (b, n, 6, 6 n), and z (b, 6 n).
+        observed: (n, 4, 4) or (b, n, 4, 4), [m].
+        L: (b, n, 6, 6) or (b, n, 6, 6 n).
+        z: (b, 6 n).
     """
     D, Jr = compute_exp_and_jacobian(twists(z, L))
     return observed @ D, Jr @ L
 
 
 def twists(z: Array, L: Array) -> Array:
-    """L z of every operation, (b, n, *), of L (b, n, *, 6) or (b, n, *, 6 n)."""
+    """The twists L z of every operation, (b, n, *), with L (b, n, *, 6) or (b, n, *, 6 n)."""
     width = L.shape[3]
     return np.asarray((L @ z.reshape(len(L), z.shape[1] // width, width, 1))[..., 0])
 
 
 def measure_largest_turn(step: Array, L: Array) -> Array:
-    """How far steps (b, 6 n) of z turn a pose at most, (b,), [rad]."""
+    """The largest rotation of a pose by a step of z, (b, 6 n): (b,), [rad]."""
     rotations = twists(step, L[:, :, 3:])
     return np.asarray(np.sqrt((rotations * rotations).sum(axis=2).max(axis=1, initial=0.0)))

@@ -1,8 +1,8 @@
-"""The shortest correction where contacts bend as much as the correction is long: Newton's method.
+"""Newton's method for the shortest correction where the contact equations are strongly curved.
 
-`gauss_newton` takes a step to the shortest z on the linearised contacts. Where these bend about what was observed, as
-for a part that was observed upside down, of which every rotation is about as far, its steps shrink by a percent only.
-The second derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions gives the step there.
+`gauss_newton` steps to the shortest z on the linearised contacts. Its steps shrink by only a percent where the contacts
+curve around the observation. An example is a part observed upside down, for which all rotations are about equally far.
+Here the second derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions gives the step.
 """
 
 from __future__ import annotations
@@ -16,20 +16,22 @@ from apo_bench.correction.solvers.whitened import whiten_poses
 from apo_bench.geometry import Array
 
 _ITERATIONS = 30
+"""Most iterations."""
 _RANK = 1e-5
-"""Singular values below this part of the largest one are rounding: the contacts hold almost."""
+"""Relative singular value below which a direction is free; larger than elsewhere, since contacts hold only nearly."""
 _APART = 1e-5
-"""Standard deviations between two derivatives whose difference is taken."""
+"""Step of the finite difference of derivatives, in standard deviations."""
 _FLAT = 1e-6
-"""Curvature along a free direction, at least: 1 where contacts do not bend."""
+"""Least curvature along a free direction; it is 1 where contacts are not curved."""
 
 
 def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, poses: Array) -> Array:
-    """The nearest poses near consistent ones, (n, 4, 4).
+    """The nearest consistent poses, (n, 4, 4), starting from consistent ones.
 
     Args:
-        observed: (n, 4, 4), what was observed, world frame, [m].
+        observed: (n, 4, 4), the observed poses, world frame, [m].
         L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
+        poses: (n, 4, 4), the start.
     """
     z = whiten_poses(observed, L, poses)
     for _ in range(_ITERATIONS):
@@ -57,5 +59,5 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
 
 
 def _linearise(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
-    """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
+    """The residual e, (b, 3 c), [m], and its transposed derivative by z, (b, 6 n, 3 c), at z, (b, 6 n)."""
     return linearise_by(system, *compute_poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

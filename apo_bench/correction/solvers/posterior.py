@@ -1,9 +1,8 @@
-"""What is still uncertain after a correction: the rank of the contacts, the free directions, the posterior covariance.
+"""Uncertainty after a correction: rank of the contacts, free directions, and posterior covariance.
 
-At a solution, singular values of the Jacobian that belong to redundant equations or free directions are rounding, so
-the rank is beyond doubt there, where it is a matter of thresholds at what was observed. The corrected z is uncertain
-within the tangent space of the contact manifold only, and there as much as the observation was: with an orthonormal
-basis N of the null space, cov(z) = N N^t.
+At a solution, singular values of redundant equations or free directions are rounding, so the rank is clear there; at
+the observed poses it depends on thresholds. The corrected z is uncertain only within the tangent space of the contact
+manifold, and there as much as the observation. With an orthonormal basis N of the null space, cov(z) = N N^t.
 """
 
 from dataclasses import dataclass
@@ -17,27 +16,27 @@ from apo_bench.correction.solvers import sparse
 from apo_bench.geometry import Array
 
 LARGEST_POSTERIOR = 600
-"""Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
+"""Most unknowns for which free directions are computed, since a basis of them is a dense matrix."""
 UNCLEAR = (1e-14, 1e-9)
-"""Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
+"""Range of squared pivots, relative to the largest: with none inside it, the rank is clear without singular values."""
 _TIE = 1e-3
-"""Parts of an axis in a span that differ by less are as good as equal."""
+"""Difference of the parts of two axes in a span up to which the first one is preferred."""
 _BLOCK = 32
-"""Columns that LAPACK treats at once, of large matrices."""
+"""Block size of LAPACK routines, in columns."""
 RANK_CUT_OFF = 1e-7
-"""Singular values below this part of the largest one are rounding, at a solution."""
+"""Relative singular value below which it is rounding, at a solution."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """What the contacts fix and leave free at one solution.
+    """The directions that contacts fix and leave free at a solution.
 
-    Degrees of freedom of the chi-square test, `Consistency.freedom`, are another number: `rank`, what is fixed.
+    The degrees of freedom of the chi-square test, `Consistency.freedom`, are `rank`, the number of fixed directions.
     """
 
     rank: int
-    """Directions that the contacts fix."""
+    """Number of fixed directions."""
     redundant: int
     """Equations, three per contact, that follow from the others."""
     spectral_gap: float
@@ -47,7 +46,7 @@ class Freedom:
 
 
 def compute_freedom(Jt: Any) -> Freedom | None:
-    """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse.
+    """The fixed and free directions from the transposed Jacobian, (6 n, 3 c), dense or sparse, at a solution.
 
     None above `LARGEST_POSTERIOR` unknowns.
     """
@@ -67,12 +66,12 @@ def compute_freedom(Jt: Any) -> Freedom | None:
 
 
 def settle_basis(N: Array) -> Array:
-    """The orthonormal basis of a span that is nearest to axes (orthogonal Procrustes; Schoenemann, 1966).
+    """The orthonormal basis of a span nearest to coordinate axes (orthogonal Procrustes; Schoenemann, 1966).
 
-    A decomposition returns some basis of a null space; rounding decides which. This one depends on the span alone.
+    The basis of a null space that a decomposition returns depends on rounding; this one depends on the span alone.
 
     Args:
-        N: (m, f), any orthonormal basis of it.
+        N: (m, f), any orthonormal basis of the span.
     """
     # The axes are those that lie in the span the most, given those before: the pivots of a Cholesky factor of the
     # projection N N^t. Of axes that are as good but for rounding the first is taken.
@@ -90,7 +89,9 @@ def settle_basis(N: Array) -> Array:
 
 
 def compute_jacobian_rank(Jt: Any) -> int:
-    """The rank alone, of a dense or a sparse matrix; from the pivots of a Cholesky factor where they are clear."""
+    """The rank of a dense or sparse matrix at a solution; from Cholesky pivots if these are clear, else by singular
+    values.
+    """
     if not isinstance(Jt, np.ndarray):
         return sparse.sparse_rank(Jt)
     if not Jt.size:
@@ -109,17 +110,17 @@ def compute_jacobian_rank(Jt: Any) -> int:
 
 
 def compute_projections(Jt: Any) -> tuple[list[int], Array | None]:
-    """The rank of each of b transposed Jacobians at a solution, and the directions it leaves free.
+    """The rank of each of b transposed Jacobians at a solution, and the projection onto its free directions.
 
-    An orthonormal basis Q of what the columns of Jt span comes from its QR decomposition, the longest column that is
-    left next (Businger and Golub, 1965); what is free is all else: P = 1 - Q Q^t, and cov(z) = P = P P^t. Observations
-    of one assembly mostly agree in which columns those are, so all but the first are decomposed without a search.
+    A pivoted QR decomposition (Businger and Golub, 1965) gives an orthonormal basis Q of the columns of Jt. The
+    projection is P = 1 - Q Q^t, and cov(z) = P = P P^t. Observations of one assembly mostly agree in the pivot columns,
+    so all but the first are decomposed without pivoting.
 
     Args:
         Jt: (b, 6 n, 3 c), or a list of one sparse matrix.
 
     Returns:
-        b numbers, and projections (b, 6 n, 6 n), or of a sparse matrix an orthonormal basis (1, 6 n, f); None above
+        b ranks, and projections (b, 6 n, 6 n), or for a sparse matrix an orthonormal basis (1, 6 n, f); None above
         `LARGEST_POSTERIOR` unknowns.
     """
     unknowns = Jt[0].shape[0]
@@ -137,7 +138,7 @@ def compute_projections(Jt: Any) -> tuple[list[int], Array | None]:
     J = np.swapaxes(Jt, 1, 2)
     Q, R = np.linalg.qr(np.swapaxes(J[:, columns], 1, 2))
     P = _across(Q)
-    # They are the basis if none of them nearly follows from the others, and all other columns do.
+    # The columns are a basis if they are clearly independent and all other columns depend on them.
     lengths = np.square(np.diagonal(R, axis1=1, axis2=2))
     longest = lengths.max(axis=1, initial=0.0)
     left = np.square(np.delete(J, columns, axis=1) @ P).sum(axis=2).max(axis=1, initial=0.0)
@@ -150,7 +151,7 @@ def compute_projections(Jt: Any) -> tuple[list[int], Array | None]:
 
 
 def _across(Q: Array) -> Array:
-    """1 - Q Q^t of orthonormal bases (*, m, r): the projections onto all else."""
+    """The projections 1 - Q Q^t onto the complement of orthonormal bases, (*, m, r)."""
     P = np.asarray(Q @ np.swapaxes(Q, -1, -2))
     np.negative(P, out=P)
     P.reshape(*Q.shape[:-2], -1)[..., :: Q.shape[-2] + 1] += 1.0
@@ -158,7 +159,7 @@ def _across(Q: Array) -> Array:
 
 
 def _row_space(Jt: Array) -> tuple[Array, NDArray[np.intp]]:
-    """An orthonormal basis of the columns of Jt, (6 n, rank), and as many columns that span as much."""
+    """An orthonormal basis of the columns of Jt, (6 n, rank), and the indices of `rank` columns that span the same."""
     if not Jt.size:
         return np.zeros((len(Jt), 0)), np.zeros(0, dtype=np.intp)
     QR, order, reflectors, _, _ = dgeqp3(Jt, lwork=2 * Jt.shape[1] + _BLOCK * (Jt.shape[1] + 1))
@@ -176,7 +177,7 @@ def compute_marginals(B: Array, free: Array) -> Array:
 
     Args:
         B: (b, n, 6, 6) or (b, n, 6, 6 n), as of `NearestPoses`.
-        free: (b, 6 n, f): an orthonormal basis of what is free, or the projection onto it.
+        free: (b, 6 n, f): an orthonormal basis of the free directions, or the projection onto them.
     """
     b, n, _, width = B.shape
     spans = B @ (free[:, None] if width != 6 else free.reshape(b, n, 6, free.shape[2]))

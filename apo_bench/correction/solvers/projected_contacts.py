@@ -1,4 +1,4 @@
-"""The contact equations of one assembly at observed poses, with vertices projected onto the faces that they lie on."""
+"""Contact equations of one assembly at given poses, with vertices projected onto the faces that they touch."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, final
@@ -12,12 +12,13 @@ from apo_bench.correction.solvers.word_products import Words, words_of
 from apo_bench.geometry import Array, pose, remember
 
 _ONE = np.eye(4)
+"""The identity pose."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ProjectedContacts:
-    """The equations of all contacts, and their vertices, laid at some poses."""
+    """The equations of all contacts, with vertices projected at some poses."""
 
     system: CompactEquations
     """With points (*, c, 3, 4)."""
@@ -28,31 +29,31 @@ class ProjectedContacts:
     pattern: Pattern
 
     def only(self, some: slice) -> "ProjectedContacts":
-        """Those of some of the observations."""
+        """The equations of some of the observations."""
         return ProjectedContacts(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
 
     def gaps(self, forms: Array) -> Array:
-        """The largest |e| of each contact, (*, c), [m]."""
+        """The largest |e| of each contact, (*, c), [m], from n D_a^-1 D_b of each contact, (*, c, 4)."""
         if not len(self.pattern.contact):
             return np.zeros(forms.shape[:-1])
         e = (forms.take(self.pattern.contact, axis=-2) * self.vertex).sum(axis=-1)
         return np.asarray(np.maximum.reduceat(np.abs(e), self.pattern.begin[:-1], axis=-1))
 
     def faces_away(self, forms: Array) -> NDArray[np.bool_]:
-        """Which contacts have faces that do not look at each other, (*, c), as `find_faces_away` has it."""
+        """Which contacts have faces that do not oppose, (*, c), as in `find_faces_away`."""
         return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
 
 
 def project_vertices(assembly: Assembly, start: Array, plane: Array, poses: Array) -> ProjectedContacts:
-    """The equations of all contacts of an assembly, vertices where they are at the poses, (*, n, 4, 4).
+    """The equations of all contacts of an assembly, with vertices projected at the poses, (*, n, 4, 4).
 
-    Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
-    taken back by the word of their contact at the poses, and dropped onto its plane. That is one affine map for each
-    contact, which takes the three points that stand for the vertices along.
+    Vertices of the environment face stay where they are. Vertices of the manipulated face are transformed by the
+    inverse of the word of their contact and projected onto the plane of the environment face. That is one affine map
+    per contact, which is applied to the three points that stand for the vertices, too.
 
     Args:
-        start: (p, 4, 4).
-        plane: (c, 4), shifted to where contacts are asked to be.
+        start: (p, 4, 4), start poses.
+        plane: (c, 4), shifted to the distance at which equations must hold.
     """
     corners = _corners(assembly)
     constants = corners.words.constants(start)
@@ -65,18 +66,18 @@ def project_vertices(assembly: Assembly, start: Array, plane: Array, poses: Arra
 
 
 class _Corners(NamedTuple):
-    """What the contacts of an assembly have in common, wherever its parts are."""
+    """The pose-independent part of the projected contacts of an assembly."""
 
     pattern: Pattern
     words: Words
     laid: NDArray[np.bool_]
-    """(c, 1, 1): as of the pattern."""
+    """(c, 1, 1): whether the vertices are those of the manipulated face."""
     vertex: Array
-    """(m, 4, 1), frame of their own part, [m]."""
+    """(m, 4, 1), in the frame of their own part, [m]."""
     points: Array
-    """(c, 3, 4): what stands for the corners of each contact, in the frame of their own part."""
+    """(c, 3, 4): the points that stand for the vertices (`compact.moments`), in the frame of their own part."""
     drops: Array
-    """(c, 4, 4): the maps v -> v - n (n v) that drop points onto the face of the environment."""
+    """(c, 4, 4): the projections v -> v - n (n v) onto the plane of the environment face."""
 
 
 @remember

@@ -1,9 +1,9 @@
-"""Sparse matrices for the solver of `gauss_newton`: time and memory grow with the contacts, not with their square.
+"""Sparse linear algebra for the solver of `gauss_newton`: time and memory grow in proportion to the contacts.
 
-Two contacts meet in J J^t only where an operation occurs in both. Contacts are numbered so that those that meet are
-near each other (reverse Cuthill-McKee); if all entries then lie in a narrow band, as in a row of castles, a banded
-Cholesky decomposition solves for the multipliers. Otherwise (grids, one part that carries everything) they are solved
-for together with z, in the sparse matrix [I J^t; J -mu].
+Two contacts are coupled in J J^t only if an operation occurs in both. Contacts are reordered so that coupled ones are
+close (reverse Cuthill-McKee). If all entries then lie in a narrow band, as in a row of castles, a banded Cholesky
+decomposition solves for the multipliers. Otherwise (grids, one part that carries everything) multipliers and z are
+solved for together, in the sparse matrix [I J^t; J -mu].
 """
 
 from collections.abc import Callable
@@ -18,48 +18,50 @@ from apo_bench.correction.solvers.linear_step import compute_poses_at, measure_l
 from apo_bench.geometry import Array
 
 WIDE = 240
-"""Rows of a band above which it is no longer worth it."""
+"""Largest width of a band for which banded Cholesky is used, in rows."""
 CROWDED = 2_000_000
-"""Pairs of contacts that meet, above which they are not listed."""
+"""Most pairs of coupled incidences that are listed."""
 _RAISED = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
-"""What is added in turn to the diagonal, in parts of its mean, while rounding keeps it from being positive definite."""
+"""Regularisation tried in turn, as fractions of the mean diagonal, while rounding makes the matrix indefinite."""
 FEW = 100
-"""Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
+"""Mean number of contacts coupled by an operation up to which J J^t is formed to find the rank."""
 _EIGENVALUE = 2e-15
-"""Eigenvalues of J J^t below this part of the largest one are rounding, at a solution."""
+"""Relative eigenvalue of J J^t below which it is rounding, at a solution."""
 
 _Solver = Callable[[Array, Array, Array], Array]
-"""(diagonal to add (3 c,), blocks (i, 6, 3), right side (3 c,)) -> z (6 n,)."""
+"""A solver: (diagonal to add (3 c,), blocks (i, 6, 3), right side (3 c,)) -> z (6 n,)."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Incidence:
-    """The unknown letters of a system: i pairs of a contact and an operation that occurs in it."""
+    """The block structure of the Jacobian: i pairs of a contact and an operation that occurs in it."""
 
     contact: NDArray[np.intp]
-    """(i,)."""
+    """(i,): the contact of each block."""
     letter: NDArray[np.intp]
-    """(i,): as of `Words.unknown`."""
+    """(i,): its unknown letter, as of `Words.unknown`."""
     operation: NDArray[np.intp]
-    """(i,)."""
+    """(i,): the operation of each block."""
     c: int
+    """Number of contacts."""
     n: int
+    """Number of operations."""
 
     def times(self, blocks: Array, z: Array) -> Array:
-        """J z, (3 c,), of blocks (i, 6, 3)."""
+        """The product J z, (3 c,), from the transposed blocks of J, (i, 6, 3)."""
         each = np.einsum("iab,ia->ib", blocks, z.reshape(self.n, 6)[self.operation])
         at = 3 * self.contact[:, None] + np.arange(3)
         return np.asarray(np.bincount(at.ravel(), each.ravel(), 3 * self.c), dtype=np.float64)
 
     def transposed_times(self, blocks: Array, y: Array) -> Array:
-        """J^t y, (6 n,)."""
+        """The product J^t y, (6 n,), from the transposed blocks of J, (i, 6, 3)."""
         each = np.einsum("iab,ib->ia", blocks, y.reshape(self.c, 3)[self.contact])
         at = 6 * self.operation[:, None] + np.arange(6)
         return np.asarray(np.bincount(at.ravel(), each.ravel(), 6 * self.n), dtype=np.float64)
 
     def matrix(self, blocks: Array) -> Any:
-        """J as a sparse matrix, (3 c, 6 n)."""
+        """J as a sparse matrix, (3 c, 6 n), from its transposed blocks, (i, 6, 3)."""
         from scipy.sparse import csr_array
 
         rows = np.broadcast_to(3 * self.contact[:, None, None] + np.arange(3), blocks.shape)
@@ -68,13 +70,13 @@ class Incidence:
 
 
 def incidence(system: CompactEquations) -> Incidence:
-    """The letters of a system that are unknown."""
+    """The block structure of the Jacobian of a system."""
     contact, letter = system.words.incidence
     return Incidence(contact, letter, system.words.operation[letter], len(system), system.n)
 
 
 def sparse_solver(where: Incidence) -> _Solver:
-    """The way to solve for z that suits the graph; what depends on the graph alone is done once."""
+    """Choose the solver for z that suits the structure; work that depends on the structure alone is done once."""
     pairs = _pairs(where)
     if pairs is not None:
         first, second = pairs
@@ -88,7 +90,7 @@ def sparse_solver(where: Incidence) -> _Solver:
 
 @final
 class SparseStep:
-    """One observation of many operations: the step of `gauss_newton` on sparse matrices."""
+    """The step with sparse matrices, for one observation of many operations."""
 
     settled = 1e-5, 1e-7  # rounding of thousands of operations is larger
 
@@ -133,13 +135,16 @@ class SparseStep:
 
 
 def sparse_rank(Jt: Any) -> int:
-    """The rank of a sparse matrix at a solution: eigenvalues of J J^t above rounding, by Sylvester's law of inertia."""
+    """The rank of a sparse matrix at a solution: the number of eigenvalues of J J^t above rounding (Sylvester's law of
+    inertia).
+    """
     from scipy.sparse import block_array, eye_array
     from scipy.sparse.linalg import splu
 
     if not Jt.nnz:
         return 0
     unknowns, m = Jt.shape
+    # The pivots of J J^t - lowest have as many positive signs as J J^t has eigenvalues above `lowest`.
     lowest = _EIGENVALUE * _largest(Jt)
     meets = abs(Jt).sign().sum(axis=1) / 3.0
     if (meets**2).sum() <= FEW * meets.sum():
@@ -153,14 +158,15 @@ def sparse_rank(Jt: Any) -> int:
 
 
 def free_basis(Jt: Any, rounding: float, sure: float) -> Array | None:
-    """An orthonormal basis of what no equation of a sparse matrix sees at a solution, (6 n, f).
+    """An orthonormal basis of the directions that no equation constrains, (6 n, f), from a sparse matrix at a solution.
 
-    With R^t R = J^t J, pivoted (Cholesky), columns F of J are independent, and one of the others moves freely if those
-    follow by -R_FF^-1 R_F. As J^t J squares the condition of J, that is corrected once by what J makes of it
+    With R^t R = J^t J, pivoted (Cholesky), columns F of J are independent. A free motion of another column makes them
+    follow by -R_FF^-1 R_F. As J^t J squares the condition of J, the result is corrected once by its residual
     (seminormal equations; Bjorck, 1987).
 
     Args:
-        rounding: Pivots below this part of the largest entry are none; with some below `sure` the rank is not clear.
+        rounding: Pivots below this fraction of the largest entry are zero.
+        sure: If a nonzero pivot is below this fraction, the rank is not clear.
 
     Returns:
         None if the rank is not clear.
@@ -173,7 +179,7 @@ def free_basis(Jt: Any, rounding: float, sure: float) -> Array | None:
     R, order, rank, _ = dpstrf(G, tol=rounding * largest)
     if not rank or not R[rank - 1, rank - 1] ** 2 > sure * largest:
         return None
-    fixed = order[:rank] - 1
+    fixed = order[:rank] - 1  # LAPACK counts from 1
     follows = R[:rank, :rank]
     N = np.zeros((len(G), len(G) - rank))
     N[order[rank:] - 1, np.arange(len(G) - rank)] = 1.0
@@ -183,7 +189,7 @@ def free_basis(Jt: Any, rounding: float, sure: float) -> Array | None:
 
 
 def _largest(Jt: Any) -> float:
-    """The largest eigenvalue of J J^t, roughly: twenty iterations of the power method from a fixed start."""
+    """Estimate the largest eigenvalue of J J^t by twenty power iterations from a fixed start."""
     y = np.cos(np.arange(Jt.shape[1]))
     size = 1.0
     for _ in range(20):
@@ -193,7 +199,7 @@ def _largest(Jt: Any) -> float:
 
 
 def _pairs(where: Incidence) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Every ordered pair of incidences that share an operation; None if there are too many."""
+    """Every ordered pair of blocks that share an operation; None if there are too many."""
     order = np.argsort(where.operation, kind="stable")
     count = np.bincount(where.operation, minlength=where.n)
     if int((count * count).sum()) > CROWDED:
@@ -207,7 +213,7 @@ def _pairs(where: Incidence) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None
 
 
 def _near(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The place of each contact in an order in which contacts that meet are near each other, (c,)."""
+    """The position of each contact in an order that puts coupled contacts close together, (c,)."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -218,7 +224,12 @@ def _near(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp]) -
 
 
 def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp], place: NDArray[np.intp]) -> _Solver:
-    """Cholesky in a band; `first` stands below or on the diagonal of `second`."""
+    """A solver by banded Cholesky decomposition.
+
+    Args:
+        first, second: Pairs of blocks whose product is an entry of J J^t on or below the diagonal.
+        place: The position of each contact, (c,).
+    """
     from scipy.linalg import solveh_banded
 
     m = 3 * where.c
@@ -251,6 +262,7 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
 
 
 def _together(where: Incidence) -> _Solver:
+    """A solver for z and multipliers together, by sparse LU decomposition."""
     from scipy.sparse import block_array, diags_array, eye_array
     from scipy.sparse.linalg import splu
 

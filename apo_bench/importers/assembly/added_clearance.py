@@ -31,7 +31,7 @@ def add_clearance(
         most_mm: Faces with a larger overlap stay as drawn; 0 changes nothing.
 
     Returns:
-        The parts in the given order, and one sentence for each part that was changed or is too thin to be changed.
+        The parts in the given order, and one sentence for each pair of which a part was changed or is too thin.
     """
     changed = {each.name: each for each in parts}
     notes = list[str]()

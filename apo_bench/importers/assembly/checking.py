@@ -59,6 +59,10 @@ class Finding(NamedTuple):
 def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "six_axis") -> Iterator[Finding]:
     """Check a scenario file from its syntax to trials in which the robot knows the true poses.
 
+    Args:
+        seeds: Number of trials; 0 runs none.
+        fidelity, arm: As in `TrialConfig`.
+
     Yields:
         Each finding as soon as it is known.
 
@@ -191,7 +195,7 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
     # The open gripper must not collide with other parts when it takes each part, with the site at its nominal pose.
     layout = place_layout(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
     poses = layout.start
-    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
         operation = scenario.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
         depth, other = struck_by(scene, move.transfer, poses, after)
@@ -216,7 +220,7 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     for i, j, yaw in sorted(places):
         x, y = np.add(site.center_m, np.multiply((i, j), site.spread_m))
         layout = place_layout(scenario, x, y, yaw, None, scene.clearance_mm)
-        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
             code = solve_key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and (code, part) not in known:
@@ -229,7 +233,11 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
 
 
 def _trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
-    """A sentence for each trial that fails."""
+    """Yield a sentence for each trial that fails.
+
+    Args:
+        config: Settings of the trials; the seed is replaced by 0, 1, ..., `seeds` - 1.
+    """
     for seed in range(seeds):
         record = run_trial(replace(config, seed=seed), scene)
         if record["success"]:

@@ -82,7 +82,12 @@ def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> li
 
 
 def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple[float, float]) -> float:
-    """Return the height over its frame of the lowest point of a turned solid above a rectangle, [m]; inf if none."""
+    """Return the height over its frame of the lowest point of a turned solid above a rectangle, [m]; inf if none.
+
+    Args:
+        R: (3, 3), orientation of the solid.
+        begin, end: Lowest and highest x and y of the rectangle, relative to the frame of the solid, [m].
+    """
     sides = [np.linspace(a + _INSET_M, b - _INSET_M, _RAYS) for a, b in zip(begin, end, strict=True)]
     grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_RAYS**2)], axis=1)
     return min(float(measure_passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)

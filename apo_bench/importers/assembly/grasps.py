@@ -86,7 +86,12 @@ def _resting(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[
 
 
 def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: RestingPart) -> Stroke:
-    """Return the straight insertion path to the goal, and the obstacles at the goal."""
+    """Return the straight insertion path to the goal, and the obstacles at the goal.
+
+    Args:
+        now: Pose of every part after the operation.
+        goal: The main part at its goal, with the obstacles there.
+    """
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
     line = plan_arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)

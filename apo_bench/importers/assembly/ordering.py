@@ -94,7 +94,12 @@ class OrderSearch:
         return None
 
     def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
-        """Yield the possible removals, the best first; groups only if no single part can be removed."""
+        """Yield the possible removals, the best first; groups only if no single part can be removed.
+
+        Args:
+            there: The parts that are assembled, the base too.
+            base: Parts that never leave.
+        """
         free = [part for part in self.solids if part in there - base]
         single = []
         for part in free:
@@ -130,7 +135,12 @@ class OrderSearch:
         )
 
     def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | RemovalObstacle:
-        """Return the operation that adds `moves` last to the other parts in `there`, or the obstacle."""
+        """Return the operation that adds `moves` last to the other parts in `there`, or the obstacle.
+
+        Args:
+            moves: The parts that leave together, the main part first.
+            there: The parts that are assembled, `moves` too.
+        """
         rest = [part for part in self.solids if part in there and part not in moves]
         main = moves[0]
         poses = self.poses

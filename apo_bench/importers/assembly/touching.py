@@ -67,7 +67,11 @@ def close_contacts(
 
 
 def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
-    """Return a sentence for each pair of parts that overlap, press fits and threads included."""
+    """Return a sentence for each pair of parts that overlap, press fits and threads included.
+
+    Args:
+        clearance_mm: Clearance per side of faces marked as fit.
+    """
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep_m = measure_intrusion(solids[a], poses[a], solids[b], poses[b])

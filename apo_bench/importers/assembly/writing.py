@@ -32,7 +32,11 @@ THRESHOLDS = {
 
 
 def write_scenario(new: NewScenario, path: Path, title: str, source: str) -> None:
-    """Write the scenario file, and the part files of its fixtures next to it."""
+    """Write the scenario file, and the part files of its fixtures next to it.
+
+    Args:
+        title, source: As in `scenario_text`.
+    """
     for fixture in new.fixtures.values():
         write_file(_fixture_file(path, fixture), fixture_xml(fixture))
     write_file(path, scenario_text(new, title, source, path))

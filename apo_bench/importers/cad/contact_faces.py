@@ -54,6 +54,7 @@ def _circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
     """Return a border, (k, 3), [mm]; if it is the whole end of a round wall, as a finer polygon than the mesh has.
 
     Args:
+        ring: The corners of the border, (k, 3), [mm].
         hole: Whether the border is that of a hole in the region.
     """
     near = ON_WALL * raw.mesh.extent

@@ -126,7 +126,7 @@ def import_solid(
 
 
 def _check_faces(source: str, count: int) -> None:
-    """Refuse a part without faces or with too many."""
+    """Raise InputError for a part without faces or with too many."""
     require(count, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is.")
     require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
 

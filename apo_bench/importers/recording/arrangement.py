@@ -15,7 +15,7 @@ from apo_bench.importers.recording.rest_intervals import RestInterval, RestInter
 
 _HIGH_M = 0.01  # largest difference of height between the start of a part and its plan
 _TILTED_DEG = 10.0  # largest difference of tilt
-"""A part that starts higher or more tilted than planned by more than these limits stands `otherwise`."""
+"""Beyond these limits, a part starts otherwise than planned: `otherwise` in `Arrangement.start_source`."""
 
 
 class Arrangement(NamedTuple):

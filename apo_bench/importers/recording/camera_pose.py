@@ -108,7 +108,13 @@ def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], const
 
 
 def _residuals(X: Array, K: Array, M: Array) -> Array:
-    """Return the body twists from known to observed poses, (k, 6)."""
+    """Return the body twists from known to observed poses, (k, 6).
+
+    Args:
+        X: (4, 4), world from camera.
+        K: (k, 4, 4), known poses in the world.
+        M: (k, 4, 4), observed poses in the camera.
+    """
     return pose.log(pose.inverse(K) @ X @ M)
 
 

@@ -30,6 +30,9 @@ def check_arrangement(
     """Raise InputError if contacts are far open, and name another convention of the log if that fits better.
 
     Args:
+        arrange: Function that arranges rest intervals again, for other conventions.
+        intervals: The rest intervals as read.
+        file: Name of the log, for messages.
         models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; the identity if missing.
     """
     if arrangement.wrong_mm <= _FITS_MM:
@@ -89,7 +92,12 @@ def check_moved(
     assembly: Assembly,
     file: str,
 ) -> None:
-    """Raise InputError if a part moved without an operation, by more than errors or an adjustment explain."""
+    """Raise InputError if a part moved without an operation, by more than errors or an adjustment explain.
+
+    Args:
+        operations: The observed operations, in order.
+        file: Name of the log, for messages.
+    """
     unseen = {part for k, each in enumerate(operations) if each.rest is None for part in assembly.operations[k].moves}
     for k, operation in enumerate(operations):
         for part, twist in {**operation.carried, **operation.adjusted}.items():

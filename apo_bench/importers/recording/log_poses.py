@@ -188,11 +188,19 @@ def _stack(cells: Mapping[str, Array], names: Sequence[str]) -> Array:
 
 
 def _check_unit_length(vectors: Array, table: LogTable, kind: str) -> None:
-    """Raise InputError unless vectors, (n, k), have length 1."""
+    """Raise InputError unless vectors, (n, k), have length 1.
+
+    Args:
+        kind: Name of such a vector, for the message.
+    """
     _refuse(np.abs(np.linalg.norm(vectors, axis=1) - 1.0) > _LENGTH_TOLERANCE, table, f"{kind} of length 1")
 
 
 def _refuse(wrong: Array, table: LogTable, needed: str) -> None:
-    """Raise InputError at the first wrong row of a mask, (n,)."""
+    """Raise InputError at the first wrong row of a mask, (n,).
+
+    Args:
+        needed: What the message asks for.
+    """
     if wrong.any():
         raise InputError(f"{table.places[int(np.argmax(wrong))]}: {needed} is needed.")

@@ -37,6 +37,7 @@ def observed_operation(
     """Return operation k, counted from 0, as observed.
 
     Args:
+        intervals: Rest intervals of every part, camera from part.
         tracks: Track of each part, camera from part.
         chosen: The rest interval that ends each operation; None for operations that were not observed.
     """

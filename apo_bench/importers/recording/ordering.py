@@ -129,6 +129,10 @@ def _best_choices(
 
     Dynamic programming over operations: what follows depends on a choice only by its last interval, except for carried
     parts. So the two best choices that end with the same interval are kept.
+
+    Args:
+        worth: Function of an operation, counted from 0, and the interval that ends it.
+        unseen: Operations that were not observed, counted from 0.
     """
     choices = [_Choice(0.0, -np.inf, ())]
     for k, operation in enumerate(assembly.operations):
@@ -202,7 +206,11 @@ def time_taken(
 def end_of_operation(
     assembly: Assembly, intervals: RestIntervals, chosen: Sequence[RestInterval | None], k: int
 ) -> float:
-    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest."""
+    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest.
+
+    Args:
+        chosen: The interval that ends each operation.
+    """
     interval = chosen[k]
     assert interval is not None
     for j, later in enumerate(chosen):

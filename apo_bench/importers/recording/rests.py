@@ -138,7 +138,13 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
 
 
 def _trim(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
-    """Remove frames at the ends that still move, until three good frames in a row; return first and last frame."""
+    """Remove frames at the ends that still move, until three good frames in a row; return first and last frame.
+
+    Args:
+        T: (n, 4, 4), poses of all frames.
+        a, b: First and last frame of the stretch.
+        noise: (6,), standard deviation of one frame per axis.
+    """
     quarter = (b - a + 1) // 4  # the mean is taken over the middle half of the stretch
     off = pose.log(pose.inverse(average(T[a + quarter : b + 1 - quarter]).T) @ T[a : b + 1])
     near = ((off / noise) ** 2).sum(axis=1) < _EDGE
@@ -147,7 +153,13 @@ def _trim(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
 
 
 def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
-    """Split a stretch at small shifts, recursively, and return the parts."""
+    """Split a stretch at small shifts, recursively, and return the parts.
+
+    Args:
+        T: (n, 4, 4), poses of all frames.
+        a, b: First and last frame of the stretch.
+        noise: (6,), standard deviation of one frame per axis.
+    """
     n = b - a + 1
     if n < 2 * _FEWEST:
         return [(a, b)]
@@ -200,6 +212,8 @@ def _is_one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) ->
     """Whether two stretches are one rest: their means agree, and the part did not leave in between.
 
     Args:
+        before, after: First and last frame of each stretch.
+        noise: (6,), standard deviation of one frame per axis.
         m: Frames in half a window; a shorter gap is not tested.
     """
     mean, mean_after = (average(T[a : b + 1]) for a, b in (before, after))

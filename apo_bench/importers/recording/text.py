@@ -87,6 +87,8 @@ def observation_rows(
     """Yield the rows of an observation in CSV form, in mm and degrees.
 
     Args:
+        parts: Main part of each operation.
+        rests: Rest that ends each operation; None if not observed.
         poses: (n, 4, 4), world, [m].
     """
     for k, (part, T, rest) in enumerate(zip(parts, poses, rests, strict=True), start=1):

@@ -54,6 +54,9 @@ class LogRows(NamedTuple):
 def sort_rows(file: str, rows: LogRows) -> Log:
     """Sort the rows of a log into tracks, each with increasing times.
 
+    Args:
+        file: Name of the log, for messages.
+
     Raises:
         InputError: The log is empty, a time stands twice or runs backwards, or a unit is another one.
     """

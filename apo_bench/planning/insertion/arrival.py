@@ -91,8 +91,8 @@ class Arrival:
 
         Returns:
             (position, felt, across): directions in which no contact constrains the part, so its position must be
-            commanded;
-            directions of the guarded macros, which end on contact; directions between walls that enclose the part.
+            commanded; directions of the guarded macros, which end on contact; directions between walls that enclose the
+            part.
         """
         cone = classify(_normals(self.touched))
         walls = cone.rows[~cone.detachable]
@@ -132,24 +132,29 @@ def arrive(
 
     # In the helpers below `way` is the unit vector of an exit from the goal, world frame.
     def along_is_free(way: Array, length_m: float) -> bool:
+        """Whether the moving parts can move along `way` by a length."""
         return is_way_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
+        """Whether an exit is free, and then the space above its end, from where the part descends."""
         begin = [PosedPieces(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
         return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
+        """Length of the line for an exit distance, [m]."""
         # Line length: exit distance plus the gap, rounded up to whole millimetres unless a length is stated.
         millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3))
         return max(_TRAVEL_M, millimetres) if stated.travel_m is None else stated.travel_m
 
     def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
+        """The first free exit between walls, by their numbers; the first candidate if none is free."""
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]  # contacts that the exit may open
         # A stated direction leads to the goal, so the exit goes the opposite way.
         there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
 
         def length(u: Array) -> float:
+            """Exit distance along `u`, [m]."""
             # Round walls may end farther out than the solids around the part require.
             ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
             return max(compute_exit_distance(moving, u, around), *ends)
@@ -234,8 +239,7 @@ def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     """Candidate exits, unit vectors (3,), off contacts that do not enclose the part, the best first.
 
     The order: straight up; against the first and the last macro; the direction that opens all contacts; axes of the
-    part;
-    each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
+    part; each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
     """
     cone = classify(normals)
     if macros.locked:  # no straight exit exists: any direction serves
@@ -262,7 +266,7 @@ def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Arr
     for way in (UP, *floors, *axes, *(-along), *along):
         within = along.T @ (along @ way)
         size = float(np.linalg.norm(within))
-        if size > 0.5:  # directions mostly across the walls are skipped
+        if size > 0.5:  # candidates more than 60 degrees off the span are skipped
             yield np.round(within / size, 12) + 0.0
 
 

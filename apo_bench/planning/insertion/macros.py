@@ -165,6 +165,7 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
             back[-1] = Macro("depart", d, (*last.makes, *macro.makes), macro.keeps, length)
         else:
             back.append(Macro("depart", d, macro.makes, macro.keeps, length))
+    # Only supports open in the last motion, so it is the lift of the transfer.
     if back and set(back[-1].makes) <= set(supports):
         back.pop()
     return tuple(back)
@@ -230,8 +231,7 @@ def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tu
     """The direction, (3,), that opens the next contacts while those made before stay closed, and the numbers of these.
 
     Straight up is preferred if that opens a contact and presses into none. Otherwise the normal of a contact is taken,
-    the
-    most upward ones first. The result is (zero, ()) if nothing can open.
+    the most upward ones first. The result is (zero, ()) if nothing can open.
 
     Args:
         left: Numbers of the contacts not made yet.

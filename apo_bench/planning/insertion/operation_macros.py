@@ -23,9 +23,9 @@ class OperationMacros:
     main: str
     carries: tuple[str, ...]
     before: Arrival
-    """How the part would arrive where the operation takes it from; its `departs` are executed."""
+    """Arrival of the part at the place that it leaves; its `departs` are executed."""
     after: Arrival
-    """How the part arrives at its goal."""
+    """Arrival of the part at its goal."""
 
     @property
     def names(self) -> tuple[str, ...]:

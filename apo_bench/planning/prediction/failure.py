@@ -1,8 +1,7 @@
 """Failure prediction: find the first operation of a plan that will fail, from the plan, the part sizes and the arm.
 
 `prediction/measures.py` computes the compared quantities. An arm that cannot reach takes precedence over all of them
-but
-an unstable goal.
+but an unstable goal.
 """
 
 from collections.abc import Sequence

@@ -59,7 +59,18 @@ def enters(assembly: Assembly, contact: Contact) -> bool:
 
 
 def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> list[tuple[tuple[Array, Array], ...]]:
-    """The errors e of contacts at the corners of their overlaps, (k,), [m], positive if the faces are apart; normals."""
+    """The errors e of contacts at their overlap corners, (k,), [m], positive if the faces are apart; and normals.
+
+    Flat faces that do not overlap in an area are measured at the corners of the whole environment face. A shaft on a
+    plane is measured at the ends of the line of contact. The normal, (3,), is that of the flat face, world frame.
+
+    Args:
+        known: Cache of measured contacts.
+        poses: World frame, [m], (4, 4), or (r, 4, 4) for r alternatives.
+
+    Returns:
+        For each alternative the pairs (e, normal), one per contact.
+    """
     alternatives = list_alternatives(poses)
     lies = iter(known.measure((contact, each) for each in alternatives for contact in contacts))
     return [tuple(residual(known.assembly, contact, next(lies), each) for contact in contacts) for each in alternatives]

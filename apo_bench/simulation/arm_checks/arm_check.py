@@ -151,8 +151,7 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
 
     Returns:
         (errors at `SPEEDS`, error at rest [mm], displacement per newton along x, y, z [mm/N]); () and not a number if
-        the
-        arm has no such line in reach.
+        the arm has no such line in reach.
     """
     robot = Robot(scene, scene.scenario.start)
     errors = []
@@ -182,7 +181,7 @@ def _push(robot: Robot, force: Array) -> Array:
     """The position of the tip, (3,), world frame, [m], after a force [N] has acted on it for `_PUSH_S`."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force
-    # moment of the force about the body's centre of mass
+    # Moment of the force about the body's centre of mass.
     robot.data.xfrc_applied[body, 3:] = np.cross(robot.tip()[:3, 3] - robot.data.xipos[body], force)
     robot.wait(_PUSH_S)
     robot.data.xfrc_applied[body] = 0.0
@@ -199,7 +198,7 @@ def _force(arm: Arm, scene: Scene) -> float:
 def _margins(scene: Scene, plan: Plan) -> Array:
     """The least distance of each joint from its limits along a plan, (joints,), [deg]; not a number if out of reach."""
     least = np.full(len(scene.arm.joints), np.inf)
-    for move in plan_moves(plan, scene):
+    for move in plan_moves(plan, scene, False, ()):
         angles = solve_key_angles(move.transfer, scene)
         if angles.code:
             return np.full(len(least), np.nan)

@@ -32,15 +32,14 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     """The motion of the scene's arm in every transfer of a plan.
 
     For the default arm, and for an `Arm` made without a description, only reach is computed, since predictions without
-    an
-    arm were tuned with the default one.
+    an arm were tuned with the default one.
 
     Args:
         spiral: As in `plan_moves`.
     """
     predicted = list[ArmMove]()
     estimated = plan.start
-    for move in plan_moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral, ()):
         operation = plan.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]
@@ -62,9 +61,9 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     code, path, ended = solve_key_angles(t, scene)
     if code:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
-    if scene.arm.hand is None:
+    if scene.arm.hand is None:  # without a gripper file only reach is predicted
         return ArmMove(step.operation, step.undo)
-    T_tip = scene.kinematics.forward(path[-1])
+    T_tip = scene.kinematics.forward(path[-1])  # at the goal
     depth, struck = struck_by(scene, t, estimated, after)
     return ArmMove(
         operation=step.operation,
@@ -135,8 +134,7 @@ def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]],
 
     Args:
         slowly: The insertion is as slow as a guarded motion. Rotation about the axis ahead of the tip then counts by
-            the
-            extent of the parts across that axis, which is small for a peg.
+            the extent of the parts across that axis, which is small for a peg.
     """
     error = motion_error(scene, SPEEDS[0 if slowly else 1])  # 0: touching, 1: inserting
     if error is None:

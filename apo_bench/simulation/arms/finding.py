@@ -58,8 +58,7 @@ def find_arm(name: str | Arm) -> Arm:
 
     Raises:
         InputError: The arm is unknown, its collection is not installed (with the command that fetches it), or it cannot
-            be
-            used.
+            be used.
     """
     if isinstance(name, Arm):
         return name

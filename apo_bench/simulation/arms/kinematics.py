@@ -30,6 +30,11 @@ class Kinematics:
     """Cost of the distance from home for an arm with more than six joints; it moves the tip by about 1e-8 m."""
 
     def __init__(self, arm: Arm, posture: bool = True) -> None:
+        """Build the model of an arm alone.
+
+        Args:
+            posture: Whether an arm with more than six joints prefers its home.
+        """
         self.arm = arm
         self.model = _alone(arm)
         self.configuration = mink.Configuration(self.model)
@@ -37,7 +42,7 @@ class Kinematics:
         self.adr = self.model.jnt_qposadr[self.ids]
         self.site = self.model.site(arm.tip).id
         self._leans = len(arm.joints) < 6
-        turning = self.LEANING if self._leans else 0.3
+        turning = self.LEANING if self._leans else 0.3  # cost of the rotation error
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=turning)
         self._cost: Array = self._task.cost[:, None]
         self._damping: Array = self.DAMPING * np.eye(self.model.nv)
@@ -154,8 +159,7 @@ class Kinematics:
         """One Newton step of all joints, (nv,), towards T; None if the programme has no solution.
 
         Without limits, mink's quadratic programme is a linear system. If its solution keeps the limits, it also solves
-        the
-        programme.
+        the programme.
         """
         # The least of 1/2 s^T H s - c^T s with H = J^T W J and c = J^T W error: without limits H s = c. A little
         # damping on the diagonal keeps H regular where the arm is straight.

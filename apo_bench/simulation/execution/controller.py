@@ -48,12 +48,13 @@ def replay(
         The state that the robot reached, and how the replay ended; `judge` takes `reached`.
     """
     start = plan.start if parts_at is None else parts_at
-    if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:
+    if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:  # cannot end in time: not even planned
         todo: tuple[Move, ...] = ()
         refused: Outcome | None = failed_outcome(plan, "plan", "time_limit", plan.schedule[0].operation)
     else:
         todo = moves_with_error(plan, scene, config, config.robot_error)
         refused = _refusal(plan, scene, todo)
+    # Hooks must see every step, and probing depends on more than the keys contain: such replays share no states.
     cache = ReplayCache() if cache is None or watch is not None or config.probing is not None else cache
     keys = cache_keys(scene, start, config.fidelity, todo, config.robot_error)
     same = None if refused or not keys or config.time_limit_s < math.inf else cache.ended(keys[-1])
@@ -82,6 +83,7 @@ def replay(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """Return the outcome of a plan that fails before anything moves: unstable or out of reach; None if it is fine."""
+    # Before each undo and at the end, the parts placed so far must stand stably at their targets.
     for upto, goals in list_poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:

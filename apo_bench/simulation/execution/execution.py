@@ -96,7 +96,7 @@ class Execution:
             robot.hooks.before_step(step)
             try:
                 with robot.watch_stability():
-                    if kept_states <= 2 * i:
+                    if kept_states <= 2 * i:  # else the restored state already holds this part
                         grip = self.pick(transfer, step.operation)
                         cache.keep(keys[2 * i], robot, grip, self.progress)
                     place(robot, transfer, grip, self.laying(transfer, step.operation))
@@ -106,7 +106,7 @@ class Execution:
             except ExecutionAborted as aborted:
                 if aborted.code != "unstable_simulation":
                     self._note_slip(step)
-                if aborted.code == "force_stop" and not step.undo:
+                if aborted.code == "force_stop" and not step.undo:  # the part is placed, but not at its goal
                     self.progress.after[step.operation] = take_snapshot(robot.scene.work, robot.data, self.plan.start)
                 return failed_outcome(self.plan, aborted.stage, aborted.code, step.operation, aborted.part)
             self.progress.after[step.operation] = reached

@@ -77,6 +77,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
     highest = max(lying, key=lambda each: float(each.T[2, 3]))
     flush = highest.T
     far = float(T[2, 3] - flush[2, 3])
+    # Displacements of the part on its way straight down, (k, 3), the last one zero.
     lifts = np.linspace(far, 0.0, max(2, round(far / _LIFT_STEP_M)))[:, None] * UP
     others = list_obstacles(assembly.solids, estimated, (t.part, *assembly.fixed))
     fixed = list_obstacles(assembly.solids, estimated, (t.part, *(set(assembly.solids) - assembly.fixed)))
@@ -110,12 +111,14 @@ def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Arra
         floor: The face, of a fixed part at `T_floor`.
     """
     n = T_floor[:3, :3] @ floor.normal
+    # Turn the part by the smallest angle that brings `up` onto the normal.
     axis = np.cross(T[:3, :3] @ up, n)
     sine = float(np.linalg.norm(axis))
     flat = np.array(T)
     if sine > 0.0:
         flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
     origin = T_floor @ make_plane_frame(floor)
+    # Then lower it vertically until its lowest point is in the plane of the floor.
     height = float(n @ (flat[:3, 3] - origin[:3, 3])) + measure_extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
     flat[:3, 3] -= height / float(n @ UP) * UP
     corners = collect_corners(scene.pieces[part])[0]
@@ -134,6 +137,7 @@ def _far_apart(points: Array) -> list[int]:
     """
     ahead = points - points.mean(axis=0)
     first = int(np.argmax((ahead * ahead).sum(axis=1)))
+    # Coordinates, up to a factor, along the direction to the first point and perpendicular to it.
     along = ahead @ ahead[first]
     across = ahead @ np.array([-ahead[first][1], ahead[first][0]])
     ends = (first, int(np.argmin(along)), int(np.argmin(across)), int(np.argmax(across)))

@@ -93,7 +93,7 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
     """Return the first clear grasp that closes along the level component of a direction, or None.
 
-    It is clear open and closed, since fingers that close flush with a wall beside the part jam against it.
+    It is clear open and closed, since fingers that close flush with a wall next to the part jam against it.
 
     Args:
         across: Direction in the frame of the part, (3,); its sign does not matter.
@@ -113,12 +113,14 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
-    """The grasp for a stroke; if none is clear all the way, however little, one to begin and one to end with.
+    """Return one grasp that is clear along a whole stroke, else two with a change of grip on the way.
 
-    Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
+    Of two, each is clear with closed fingers on its part of the stroke, and both with open fingers at the change. The
+    preferred grasp is tried first, and returned if nothing is clear.
 
     Args:
-        places: Where else the part is picked up or put down, clear for the grasp that is used there.
+        places: Further places at which the part is picked up or put down, before the stroke.
+        stroke: A straight motion to the goal; the part can also be pulled out backwards along it.
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
     solid = scene.scenario.assembly.solids[part]
@@ -150,7 +152,7 @@ def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0]) if grasp.ahead is None else grasp.ahead
     across = grasp.across
     along = float(across @ ahead)
-    if abs(along) > _SQUARE:  # of a part that stands tilted
+    if abs(along) > _SQUARE:  # the part is tilted: make the closing direction perpendicular to the z axis
         across = across - along * ahead
         across = across / np.linalg.norm(across)
     return frame(np.column_stack([across, np.cross(ahead, across), ahead]), grasp.point)
@@ -159,8 +161,8 @@ def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """Return half the width of the part between the fingers, [m].
 
-    This is half the extent of the whole part if it consists of boxes and the fingers hold its full width, or if the
-    width at the grasp cannot be measured.
+    For a part of boxes whose full width the fingers hold, this is half the extent of the part. The same extent is used
+    if the width at the grasp cannot be measured.
 
     Args:
         T: Pose of the part, (4, 4), from which a grasp without `ahead` has its vertical.
@@ -174,7 +176,7 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
 
 
 def _known_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
-    """Return the half width stored with the grasp, else compute it; a hundred candidates would take seconds."""
+    """Return the half width stored with the grasp, computed only if it is missing, since that is slow."""
     return half_width(pieces, grasp, T) if grasp.half_width is None else grasp.half_width
 
 
@@ -198,6 +200,7 @@ def _pair(
     last = list(_clear(scene.kinematics, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
         change = RestingPart(translate(stroke.T, stroke.direction, -left), stroke.around)
+        # The change happens where the first grasp must stop, if the open gripper is clear there.
         if 0.0 < left < _MOST_LEFT_M and any(_clear(scene.kinematics, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.direction, left, stroke.around)
             for second in _clear(scene.kinematics, solid, last, [change], margin):
@@ -226,7 +229,9 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     size = high - low
     middle = (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
+    # From the middle of the box up to the height of the tip, in the frame of the part.
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
+    # For each level axis across which the fingers close, the candidates are spread along the other one.
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     grasps = []
     for axis, along in (level, level[::-1]):
@@ -256,6 +261,7 @@ def find_clear_grasp(
     # Grasps that are not clear with the least margin are not clear with a larger one.
     left = [] if first is not None else list(_clear(kinematics, solid, grasps, places, less[-1], strokes))
     margins = less[:-1] if left else ()
+    # The widest margin, else the ones between, else the least.
     return next(
         (g for m in margins for g in _clear(kinematics, solid, left, places, m, strokes)),
         first or next(iter(left), None),
@@ -341,6 +347,7 @@ def _nearest(kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke,
     """
     lefts = _lefts(stroke)
     struck = _closed_depth(kinematics, solid, grasp, stroke, lefts, margin) > 0.0
+    # argmax: index of the first place with a collision.
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
 
 
@@ -379,6 +386,7 @@ def gripper_depth(
     """
     boxes = list_gripper_boxes(kinematics, opening, margin)
     low, high = measure_upright_bounds(boxes, R, np.zeros(3))
+    # The bounding box of the gripper at all places together.
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)
     depth = np.full(len(at), -1.0)

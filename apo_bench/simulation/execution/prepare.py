@@ -58,7 +58,7 @@ class Move(NamedTuple):
 
 
 @remember
-def plan_moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
+def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...]) -> tuple[Move, ...]:
     """Return the move of each step of the schedule.
 
     Cached, since both the plan check and the execution need the moves.
@@ -114,7 +114,7 @@ def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False, ()))
 
 
 def _transfer(
@@ -141,18 +141,20 @@ def _transfer(
     part = operation.main
     start = estimated[part]
     nominal = list_nominal_operations(scene.scenario)[k]
+    # Contacts at the start and at the goal: before or after this operation, as the scenario states them.
     leaves = nominal.after if undo or was == k else nominal.before
     comes = nominal.before if undo else nominal.after
     contacts = tuple(each.contact for each in comes.touched)
     into = plan_arrival_line(comes, target)
     inserts = any(macro.inserts for macro in comes.macros)
-    if undo and not into.level:
+    if undo and not into.level:  # back at its start the part is put down, whatever it touches there
         into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
     out = plan_arrival_line(leaves, start)
     preferred = scene.scenario.grasps[k if was is None or not out.level else was]
     grips, out, into = transfer_grips(scene, part, preferred, out, into, estimated, after)
     macros = motions(comes, target, slide_directions(assembly, comes, after))
     top, bottom = ends_of(assembly, operation.moves, estimated)
+    # Height of the tip over the lowest point of the moved parts.
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}

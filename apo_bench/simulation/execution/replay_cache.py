@@ -144,6 +144,7 @@ def cache_keys(
     )
     keys = []
     for step, t in moves:
+        # Until its part is lifted a move depends on fewer fields, so more replays share this state.
         before = digest.copy()
         before.update(_bytes(_until_lifted(t)))
         digest.update(_bytes((step, t)))

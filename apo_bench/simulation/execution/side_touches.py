@@ -34,7 +34,7 @@ _CHECKED_M = 0.004  # spacing of the places checked on the way down
 
 
 class SideTouch(NamedTuple):
-    """One touch of a wall with the side of a part."""
+    """One guarded motion of a held part, and the point and wall that touch at its end."""
 
     T: Array
     """Pose of the part when the motion begins, (4, 4), world."""
@@ -82,7 +82,7 @@ def find_side_touches(
         n = estimated[part][:3, :3] @ face.normal
         corners = pose.apply(estimated[part], face.outline)
         low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
-        deep = high - low - _OVER_M
+        deep = high - low - _OVER_M  # height of the higher point over the lowest one of the part
         if face.fit or deep - _OVER_M < _APART_M:  # a face with clearance, or a wall that is too low
             continue
         (wall,) = list_obstacles(assembly.solids, estimated, tuple(set(assembly.solids) - {part}))
@@ -90,7 +90,7 @@ def find_side_touches(
         along = np.cross(UP, n)
         ends = corners @ along
         lines = np.arange(ends.min() + _STEP_M, ends.max(), _STEP_M)
-        for at in sorted(lines, key=lambda at: abs(at - ends.mean())):
+        for at in sorted(lines, key=lambda at: abs(at - ends.mean())):  # from the middle of the wall outwards
             edge = at * along + float(n @ corners[0]) * n + high * UP
             for R in _upright_turns(scene, t, upright, n):
                 both = tuple(_at(scene, t, R, n, edge, up) for up in (_OVER_M, deep))
@@ -124,6 +124,7 @@ def _at(scene: Scene, t: Transfer, R: Array, n: Array, edge: Array, up: float) -
     pieces = scene.pieces[t.part]
     along = np.cross(UP, n)
     sides = measure_extent(pieces, R.T @ along)
+    # In world axes: at this height, on the side towards the wall, in the middle along it; then in the part's frame.
     point = R.T @ (
         (measure_extent(pieces, R.T @ UP)[0] + up) * UP
         + measure_extent(pieces, R.T @ n)[0] * n
@@ -140,6 +141,7 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
     above = np.arange(0.0, t.safe, _CHECKED_M)[:, None] * UP
     aside = _ROOM_M * np.cross(UP, place.normal)
     into = (STAND_OFF_M + _ROOM_M) * place.direction
+    # Shifts of the hand: on the way down and at the end in the wall, each with room on both sides along the wall.
     whole = np.vstack([above + aside, above - aside, into + aside, into - aside])
     R = place.T[:3, :3]
     for each, shifts in ((wall, above), *((other, whole) for other in others)):

@@ -24,8 +24,8 @@ _DOWN = float(np.cos(np.radians(10.0)))  # downward component below which a tip 
 ASIDE_M = 0.006
 """Distance from the touched side at which a slide begins.
 
-A part that touches another at its side is moved off by the same distance before it is lifted, since it may drift
-towards its neighbour in the hand.
+A part that touches another at its side is moved off by the same distance before it is lifted. Otherwise it may drift
+against its neighbour in the hand.
 """
 
 
@@ -34,7 +34,7 @@ PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
 
 
 class Grip(NamedTuple):
-    """How the gripper holds the part."""
+    """The pose of the tip at a part, and the opening at which the fingers touch it."""
 
     T_part_tip: Array
     """Pose of the tip in the frame of the part, (4, 4)."""
@@ -152,12 +152,12 @@ class Transfer:
 
     @property
     def sides(self) -> tuple[Array, ...]:
-        """Directions in which the part is slid onto another one at its side, (3,) each."""
+        """Directions in which the part is slid against others at its sides, (3,) each, world."""
         return tuple(macro.direction for macro in self.macros if macro.name == "slide-to-contact")
 
     @property
     def away(self) -> tuple[Array, ...]:
-        """Directions in which the part is first moved off another one at its side, (3,) each."""
+        """Directions in which the part is moved off others at its sides before it is lifted, (3,) each, world."""
         directions = [macro.direction for macro in self.departs]
         return () if self.out.level else tuple(each for each in directions if abs(each[2]) < 0.5)
 

@@ -90,7 +90,7 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
         for k in range(len(scenario.assembly)):
             hands.begin(k)
             target = layout.poses[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
-            # displaced parts, corrected at the last operation
+            # Displaced parts are corrected at the last operation.
             late = error.left if k == len(scenario.assembly) - 1 else ()
             perform(hands, plan_hand_operation(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
             after.append(take_snapshot(scene.shown, hands.data, layout.start))

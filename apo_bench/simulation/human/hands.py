@@ -40,18 +40,19 @@ class Hands:
     """Two hands and the parts, for one demonstration."""
 
     def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
+        """Put all parts at their start poses; the first tick is called at once."""
         self.scene = scene
         self.world = scene.shown
         self.data: Any = make_initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
         self._hooks = as_hooks(watch)
         self._operation: int | None = None
-        self._steps = 0
-        self._every = max(1, round(self._hooks.tick_s / self._step_s))
+        self._steps = 0  # since the last tick
+        self._every = max(1, round(self._hooks.tick_s / self._step_s))  # steps of a tick
         self._tick(self.data)
         self._mocap = [int(self.world.model.body(hand).mocapid[0]) for hand in HANDS]
-        self._at = [np.eye(4) for _ in HANDS]
-        self._held: list[dict[str, Array]] = [{} for _ in HANDS]
+        self._at = [np.eye(4) for _ in HANDS]  # pose of each hand
+        self._held: list[dict[str, Array]] = [{} for _ in HANDS]  # part -> its pose in the hand
 
     def begin(self, operation: int) -> None:
         """Call the hook before an operation, counted from 0."""
@@ -96,7 +97,7 @@ class Hands:
         """
         counts = [max(1, round(line.seconds / self._step_s)) for _, line in moves]
         n = max(counts)
-        hand, line = moves[counts.index(n)]
+        hand, line = moves[counts.index(n)]  # the longest motion
         done = 0
         if len(moves) > 1:
             # Simulate until the part in the other hand has come to rest.
@@ -145,9 +146,8 @@ class Hands:
             begin: Steps done before.
             data: The state to change.
         """
-        at = (
-            begin + steps + np.array([0.0, TINY_S / self._step_s])
-        )  # at the end and slightly later, for the velocity, in steps
+        # In steps: at the end and slightly later, for the velocity.
+        at = begin + steps + np.array([0.0, TINY_S / self._step_s])
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
         for part, T_hand_part in self._held[hand].items():
             # The pose of a hand without delay that would hold the part where it is.
@@ -176,6 +176,7 @@ class Hands:
 
     def _step(self, n: int) -> None:
         """Simulate n steps, and call the hook after every tick."""
+        # `left`: steps until the next tick.
         while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
             self._tick(self.data)

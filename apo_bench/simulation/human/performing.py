@@ -90,12 +90,13 @@ def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
 
 
 def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
-    """Move the main part to its place along `stroke`; the other hand corrects displaced parts, the last one meanwhile."""
+    """Move the main part along `stroke` to its place; the other hand corrects displaced parts, the last meanwhile."""
     standing = [part for part in operation.late if part not in operation.carries]
     for part in standing[:-1]:
         _adjust(hands, part, operation.true[part], _LIFT_M, ())
         hands.let_go(1, part)
     if standing:
+        # Meanwhile the main part goes the first 15 % of its stroke.
         _adjust(hands, standing[-1], operation.true[standing[-1]], _LIFT_M, ((0, _first(stroke, 0.15)),))
         hands.move((0, smooth_trajectory(_first(stroke, 0.15).end, stroke.end, _STROKE)))
     else:

@@ -99,7 +99,7 @@ def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist
     """Follow a line until the filtered force against `direction` exceeds `newton`, and stop there at once.
 
     The arm moves on while the sensor lags behind by its time constant. At 2 mm/s the impact of a first touch stays
-    below the collision limit of 20 N, also with half the time step, and the tip stops within 0.03 mm of the touch. At
+    below the collision limit of 20 N, also with half the time step. The tip then stops within 0.03 mm of the touch. At
     4 mm/s this holds with the usual step only, at 10 mm/s not at all.
 
     Args:

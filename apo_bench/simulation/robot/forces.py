@@ -20,7 +20,7 @@ _COLLISION_N = 20.0
 
 
 class LowPass:
-    """A first-order filter, y' = (x - y) / time constant. Plain numbers, since arrays this small are slow."""
+    """A first-order low pass of a force, dy/dt = (x - y) / time constant; plain floats, since small arrays are slow."""
 
     def __init__(self, time_constant_s: float) -> None:
         self._time_constant_s = time_constant_s
@@ -63,7 +63,7 @@ class ForceSensors:
         self._names = (*work.free, *work.fixed)
         contacts = sensordata[: 3 * (len(work.free) + len(self._names))]
         self.sensors = contacts
-        """The contact sensors as the last step left them."""
+        """The contact sensors after the last physics step: a view of `sensordata`."""
         self._on_arm_flat = contacts[3 * len(work.free) :]
         self._on_arm = self._on_arm_flat.reshape(-1, 3)
         self._net_of_sensors = np.zeros((3, len(contacts)))  # contact sensors -> net force on the held parts

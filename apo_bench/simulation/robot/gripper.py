@@ -61,7 +61,7 @@ def list_gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0
 
 
 class SlideFingers:
-    """Slide joints that are zero when closed, and one position actuator."""
+    """Fingers on slide joints that are zero when closed, with one position actuator for all."""
 
     def __init__(self, model: Any, arm: Arm) -> None:
         self._grip = model.actuator(f"arm/{arm.grip}").id
@@ -70,7 +70,7 @@ class SlideFingers:
         self.slack = float(limit / stiffness) if model.actuator_forcelimited[self._grip] else math.inf
         """Distance between command and opening at which the drive reaches its force limit, [m]."""
         self.longest_s = _LONGEST_S
-        """How long the fingers may take to rest behind their command."""
+        """Time that the fingers may take to rest after their command has arrived, [s]."""
         joints = [model.joint(f"arm/{name}").id for name in arm.fingers]
         self._dof = model.jnt_dofadr[joints]
         self._qpos = model.jnt_qposadr[joints]

@@ -4,7 +4,7 @@
 relative velocity of both sides. Their relative acceleration is J a + dJ/dt v, and dJ/dt v is not zero where contacts
 move along an arc. So the pads carry a part with a velocity error of some |dJ/dt v| / b, 1 mm/s: the part creeps by 0.1
 to 1.1 mm until it is above its goal. Subtracting dJ/dt v on the right side at each step reduced 0.77 mm to 0.03 at
-best, and 0.41 to 0.18 at worst, which does not justify its cost.
+best, and 0.41 to 0.18 at worst. This does not justify its cost.
 
 Friction, the force and stiffness of the fingers and the softness of friction change the creep by at most 0.04 mm. Half
 the speed halves it. Half the time constant of the pads does too, but then misplaced parts slip into place.
@@ -22,7 +22,7 @@ from apo_bench.simulation.scene import Scene, World, get_part_pose, set_part_pos
 SLIPS_M = 5e-5
 """Displacement in the hand within a tick above which a part slips, and is not put back."""
 TINY_S = 1e-4
-"""Speeds of the tip are differences over this time."""
+"""Time step of the finite differences that give the velocity of the tip."""
 
 
 class Carried(NamedTuple):
@@ -49,9 +49,9 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
     now = get_part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
         wanted = T_world_tip @ carried.T_tip_part
-        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:
+        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:  # creep; else the new pose is kept from now on
             shift = wanted @ pose.inverse(now)
-            velocity = np.array(data.qvel)
+            velocity = np.array(data.qvel)  # `set_part_pose` stops a part
             for part in carried.parts:
                 set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
             data.qvel[:] = velocity

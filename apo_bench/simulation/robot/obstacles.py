@@ -62,10 +62,11 @@ class MovingPieces(NamedTuple):
 
 
 def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[MovingPieces]:
-    """Return what moves with the tip: first the gripper at an opening of each finger, [m], then each held part.
+    """Return everything that moves with the tip: first the gripper, then each held part.
 
     Args:
         T_tip: Present pose of the tip, (4, 4), world.
+        opening: Of each finger, [m].
         held: The held parts, at their present poses in the simulation.
     """
     inverse = pose.inverse(T_tip)
@@ -103,6 +104,7 @@ def find_near_spans(
     if not _still(world, data, others):
         return [(0, n)]
     obstacles = [make_obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
+    # Indices of the steps that are checked, about evenly spaced along the line, and the last one.
     places = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
     near = _near(moving, obstacles, line, s[places], near_m[len(held) > 1])  # index 1: of a group
     return _spans(near, places, n, run_up_s, float(scene.physics.timestep_s))
@@ -139,7 +141,7 @@ def _near(
         low = tips + (low - margin)
         high = tips + (high + margin)
         may: _Flags = np.all((low[:, None] < bounds[:, 1]) & (high[:, None] > bounds[:, 0]), axis=-1)
-        if turns:
+        if turns:  # the bounding box of the sweep decides
             near |= may.any(axis=1)
             continue
         for i in map(int, np.flatnonzero(may.any(axis=0))):

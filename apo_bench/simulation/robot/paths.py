@@ -102,7 +102,7 @@ def plan_paced_trajectory(
 
 
 def interpolate_minimum_jerk(t: Array) -> Array:
-    """10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan, 1985)."""
+    """Return the progress 10 t^3 - 15 t^4 + 6 t^5 at times t in [0, 1] (Flash and Hogan, 1985)."""
     return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
 
 
@@ -116,7 +116,8 @@ class _Trapezoid:
 
     def __call__(self, t: Array) -> Array:
         r = self.ramp
-        top = 1.0 - self.ramp
+        top = 1.0 - self.ramp  # begin of the second ramp, and the area under the trapezoid of height 1
+        # The integral of this trapezoid: parabola, line, parabola.
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
 
@@ -164,7 +165,7 @@ def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...
 
 
 def waypoints_around(base: Array, rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
-    """Return one waypoint beside the base of the arm, and the end.
+    """Return one waypoint on a circle around the base of the arm, and the end.
 
     The tip passes the base on the side of its pose `rest`, as far from the base as the farther of both ends.
 

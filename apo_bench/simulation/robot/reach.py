@@ -60,7 +60,7 @@ def solve_end_angles(kinematics: Kinematics, line: Trajectory, begin: float, end
         begin, end: Fractions of the line, from 0 to 1.
         q: Joint angles at `begin`, (joints,), [rad].
     """
-    for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):
+    for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):  # few knots first, since they take less time
         knots = _knots(
             kinematics,
             line,

@@ -48,8 +48,8 @@ class ExecutionAborted(Exception):
     Attributes:
         stage: What the robot did: `pick`, `carry`, `attach` and so on.
         code: What went wrong, a failure code.
-        part: Which part it is about, if not the one that is moved.
-        why: What is known of the cause.
+        part: The part concerned; empty if it is the moved one.
+        why: A phrase about the likely cause; empty if it is unknown.
     """
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
@@ -61,7 +61,7 @@ class ExecutionAborted(Exception):
 
 
 class Robot:
-    """One arm during one replay."""
+    """The controller of one arm during one replay, with the simulation that it moves in."""
 
     def __init__(
         self,
@@ -83,6 +83,7 @@ class Robot:
         self.arm = scene.arm
         self.model = scene.work.model
         self.hooks = as_hooks(watch)
+        # The action in progress, for outcomes and hooks.
         self.stage = "plan"
         self.macro = ""
         self.step: Step | None = None
@@ -147,6 +148,7 @@ class Robot:
             return 0.0
         kinematics = self.scene.kinematics
         line, knots = limit_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        # Progress along the line after each of n physics steps.
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         done = 0

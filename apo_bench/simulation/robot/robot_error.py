@@ -16,7 +16,7 @@ from apo_bench.geometry import Array
 @final
 @dataclass(frozen=True, eq=False)
 class RobotError:
-    """The errors of one trial."""
+    """The calibration errors of the robot and the slip in its hand in one trial."""
 
     hand_eye: Array
     """Hand-eye error E, (4, 4): the robot goes to E T for a pose T in the world."""

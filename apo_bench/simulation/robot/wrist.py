@@ -1,8 +1,8 @@
 """A force-torque sensor at the wrist, with noise, an offset (tare) and a low-pass filter.
 
 The sensor measures the wrench that the arm exerts on its hand. The external wrench, of the surroundings on the hand and
-the held parts, is the known weights minus this reading. The robot knows the weight of the hand from its own model, that
-of a part from the part file and its estimated pose in the hand, and the orientation of the hand from its encoders.
+the held parts, is the known weights minus this reading. The robot knows the weight of the hand from its own model, and
+that of a part from the part file and its estimated pose in the hand. Its encoders give the orientation of the hand.
 Inertial forces are not compensated: a hand of 1 kg that accelerates at 1 m/s^2 shows 1 N.
 """
 
@@ -37,7 +37,7 @@ class Load(NamedTuple):
 
     mass_kg: float
     center: Array
-    """Its centre of mass, (3,), in the frame of the tip, [m]."""
+    """Centre of mass, (3,), in the frame of the tip, [m]."""
 
 
 def hand_load(kinematics: Kinematics, opening: float) -> Load:
@@ -128,7 +128,7 @@ class WristSensor:
 
     @property
     def sigma(self) -> tuple[float, float]:
-        """Standard deviation behind the low pass, per axis, [N] and [Nm]."""
+        """Standard deviations of force and torque behind the low pass, per axis, [N] and [Nm]."""
         return filter_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:

@@ -203,8 +203,7 @@ def _add_force_sensors(spec: Any, scenario: Scenario, arm: str) -> None:
     """Add contact force sensors: of every movable part on everything it touches, then of every part on the arm.
 
     MuJoCo computes such a sensor only while one of its two bodies is awake, and a body that cannot move never is. So
-    the arm
-    is named by its first moving link. By its base, a fixed part and the arm would have no sensor while sleep is
+    the arm is named by its first moving link. By its base, a fixed part and the arm would have no sensor while sleep is
     allowed.
 
     Args:

@@ -89,8 +89,7 @@ def dress(
 
     Args:
         pieces: Name of a geom in the part file -> the pieces that replace it. The piece of the same name takes the
-            geom;
-            others become new geoms like it; without such a piece the geom is deleted.
+            geom; others become new geoms like it; without such a piece the geom is deleted.
         bits: Contact bits by the name of a piece.
     """
     body = spec.worldbody.bodies[0]

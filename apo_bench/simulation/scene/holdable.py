@@ -21,11 +21,11 @@ _BESIDE_M = 0.002
 def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
     """Raise an `InputError` if a part is too wide for the open gripper, too heavy or too smooth.
 
-    The span of boxes between the pads is not required to be found: they are held across their whole width.
+    A grasp with nothing between the pads is an error, too, unless the part is of boxes alone: then the replay loses it.
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
         solid = scenario.assembly.solids[operation.main]
-        # direction away from the gripper's approach, part frame
+        # Opposite of the direction of approach, part frame.
         up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
         span = measure_held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))

@@ -82,7 +82,7 @@ def copy_data(data: Any, into: Any) -> None:
 
 
 def place_for_picture(model: Any, data: Any) -> None:
-    """Update everything that a picture shows from the positions of a state: frames, centres of mass, cameras, lights."""
+    """Update what a picture shows from the positions of a state: frames, centres of mass, cameras, lights."""
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)
@@ -161,6 +161,7 @@ class Film:
         self._next = 0.0
 
     def __call__(self, data: Any) -> None:
+        """Keep an image if its time has come; `data` is a `mujoco.MjData`."""
         if data.time >= self._next:
             self.frames.append(self.shot(data))
             self._next = data.time + self._every - 1e-9
@@ -236,6 +237,7 @@ class ReplayWindow:
         self._window: Any = None
 
     def __call__(self, data: Any) -> None:
+        """Show a state in real time; the first call opens the window."""
         import time
 
         import mujoco.viewer

@@ -3,8 +3,7 @@
 For each operation the main part, with what it carries, is put at its observed pose. Then everything moves under gravity
 and contact, in the same soft contacts as replays, until it rests. The corrected pose is that of the main part, and all
 parts stay where they came to rest. During the first `SOFT_S` all motion is strongly damped, so that parts that
-penetrate
-separate slowly instead of jumping.
+penetrate separate slowly instead of jumping.
 
 The simulation uses neither the contacts nor the covariances of the observation. Fit faces recede by the play that the
 observation states, or by `CLEARANCE_M`; all parts have the same density.

@@ -24,7 +24,10 @@ WRIST_SENSORS = ("wrist_force", "wrist_torque")
 @final
 @dataclass(frozen=True, eq=False)
 class World:
-    """A compiled model and the indices of its parts, shared by all trials of a scene; a trial owns only its `MjData`."""
+    """A compiled model and the indices of its parts, shared by all trials of a scene.
+
+    A trial owns only its `MjData`.
+    """
 
     model: Any
     """`mujoco.MjModel`. Trials change weld targets before they activate a weld, and options for a while."""

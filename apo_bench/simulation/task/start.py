@@ -135,7 +135,7 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
         return Outcome(
             aborted.stage, aborted.code, k, describe_outcome(aborted.code, part=aborted.part or t.part, operation=k)
         )
-    left = execution.residual
+    left = execution.residual  # errors that remain after compensation
     return Start(
         operation=k,
         parts=dict(execution.plan.start),

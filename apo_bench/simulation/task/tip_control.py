@@ -113,7 +113,7 @@ class TipControl:
             turn: Rotation vector about the front, (3,), in the same frame, [rad].
 
         Raises:
-            ExecutionAborted: Something was struck, or fell out of the hand.
+            ExecutionAborted: The arm collided, or the part fell out of the hand.
         """
         with self._stepping():
             self._move(shift, turn)
@@ -162,7 +162,7 @@ class TipControl:
         For observers only, as `poses`.
 
         Args:
-            goals: Goal poses of the part, (4, 4) each, world; a part with symmetries may have several.
+            goals: Goal poses of the part, (4, 4) each, world: one relative to each neighbouring part.
 
         Returns:
             Offset of the front, two lateral numbers and one along the axis, negative before the goal; then the turn as
@@ -174,7 +174,7 @@ class TipControl:
         found = []
         for goal in goals:
             direction = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.direction
-            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]
+            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]  # offset of the front
             turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
             across = (far - (far @ direction) * direction) @ self._R
             found.append([*across[:2], far @ direction, *turn @ self._R])
@@ -210,6 +210,7 @@ class TipControl:
         direction = self.start.transfer.into.direction
         T = robot.T
         off = self._off(T)
+        # Limits of the front's position, in the frame of the axis.
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
         # Velocity of the front by the action, world; it also corrects the linearisation error of the last period.
@@ -225,7 +226,7 @@ class TipControl:
         turning = back @ twist
         shifting = back[:, :3] @ R.T
         q = robot.q
-        left = self._left - float(off[2])
+        left = self._left - float(off[2])  # distance to the goal, [m]
         for _ in range(steps):
             f = np.array(self._filtered(self._force, dt))
             push = -float(f @ direction)
@@ -233,6 +234,7 @@ class TipControl:
             yields = _YIELD * f
             if self.nominal:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
+                # Fast: unfiltered force, since the filter would react too late.
                 struck = -float(np.dot(self._force, direction)) if self._speed > _STRUCK else push
                 if self._stopped is None and max(struck, side) > self._guard:
                     # First contact: continue from the measured joint angles, which takes the pressure away.
@@ -249,12 +251,12 @@ class TipControl:
             self._passed += 1
             self._force = robot.servo_step(q, self._passed, leads)
             self._wrist.take(dt)
-        self._at = from_there + moved @ self._R
+        self._at = from_there + moved @ self._R  # rows times R: from the world to the frame of the axis
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
         push = -float(np.dot(self._filtered.force, direction))
         self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
-        here = left - self._pace.end
+        here = left - self._pace.end  # distance to the end of the motion
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
     def _ahead(self, left: float, push: float, side: float, dt: float) -> float:

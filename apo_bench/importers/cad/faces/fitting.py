@@ -186,6 +186,8 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     """Return the region of triangles on a cylinder or a cone, with its two ends.
 
     Args:
+        surface: The fitted surface.
+        hole: Whether the wall faces its axis.
         turn: Angle that the wall covers about the axis, [rad].
         sides: Facets around a full turn in the mesh; 0: unknown.
     """

@@ -136,6 +136,11 @@ def _seed_cylinder(
     """Return a start for a cylinder from edge `row`, and the facets around that edge.
 
     The axis is the edge, the circle goes through the ends of parallel edges nearby. None if there are too few.
+
+    Args:
+        row: Row of the smooth edge in `facets.smooth`.
+        edges_around: Facet -> rows of its smooth edges.
+        taken: Which facets belong to earlier walls, (f,).
     """
     a, b = mesh.corners[facets.along[row]]
     length = np.linalg.norm(b - a)
@@ -154,7 +159,11 @@ def _seed_cylinder(
 def _seed_cone(
     mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
-    """Return a start for a cone from edge `row`, and the facets it was fitted to; None if there are too few."""
+    """Return a start for a cone from edge `row`, and the facets it was fitted to; None if there are too few.
+
+    Args:
+        row, edges_around, taken: As in `_seed_cylinder`.
+    """
     # Facets of one cone meet at equal angles: collect them outwards from the first facet over edges of that angle.
     angle = facets.angle[row]
     members = {int(facets.smooth[row, 0])}

@@ -120,6 +120,7 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: 
     """Return the ends of round surface k that continue smoothly, at most two.
 
     Args:
+        wall: Round surface number k.
         of: Round surface of each facet, (f,); -1 for none.
         middle: Height of the middle of the surface along its axis, which separates the two ends.
     """

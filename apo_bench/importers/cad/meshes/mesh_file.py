@@ -113,7 +113,11 @@ def check_triangles(path: Path, count: int) -> None:
 
 
 def check_size(path: Path, longest_mm: float, unit: str) -> None:
-    """Raise InputError if the longest side is not that of a part."""
+    """Raise InputError if the longest side is not that of a part.
+
+    Args:
+        unit: The unit and its origin, for the message.
+    """
     allowed = f"{SMALLEST_PART_MM:g} mm to {LARGEST_PART_MM / 1000:g} m"
     require(
         SMALLEST_PART_MM <= longest_mm <= LARGEST_PART_MM,

@@ -117,7 +117,11 @@ def _numbers(elements: Iterable[ElementTree.Element], names: tuple[str, str, str
 
 
 def _read_places(model: str, elements: Iterable[ElementTree.Element]) -> list[tuple[_Key, Array]]:
-    """Return the keys and poses, (4, 4), of the components of an object, or of the items of a build."""
+    """Return the keys and poses, (4, 4), of the components of an object, or of the items of a build.
+
+    Args:
+        model: Path of the model that holds the elements.
+    """
     places = []
     for each in elements:
         # 3MF states transforms for row vectors, x' = x M, hence the transpose.

@@ -81,7 +81,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
         kept.pop()
     pieces = _bore(outlines, kept, flats)
     while pieces is None and kept:
-        # Drop a quarter of the holes, or as many as needed.
+        # Fill at least a quarter of the holes, the least important ones.
         kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // least_pieces(kept)))]
         pieces = _bore(outlines, kept, flats)
     if pieces is None:

@@ -52,6 +52,8 @@ def _cut(
     """Cut a part along planes of reflex edges while cuts are left, and yield what needs or allows no more cuts.
 
     Args:
+        size, volume: Of the whole solid, for tolerances.
+        flats: Planes n . x = d of flat faces, (k, 4).
         only_flats: Whether to cut only along planes of flat faces.
         cuts: One number, the cuts left; counted down here.
     """
@@ -79,7 +81,11 @@ def _cut(
 
 
 def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
-    """Yield planes (n, d) through the middle of a cavity, across its shortest side first; none without a cavity."""
+    """Yield planes (n, d) through the middle of a cavity, across its shortest side first; none without a cavity.
+
+    Args:
+        least: Bodies of less volume are rounding, [mm^3].
+    """
     for each in body.decompose():
         if each.volume() < -least:
             low, high = np.array(each.bounding_box()).reshape(2, 3)
@@ -91,6 +97,10 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
     """Return the planes (n, d) of reflex edges, those with the longest edges first.
 
     A plane within tolerance of a flat face is replaced by the exact plane of that face.
+
+    Args:
+        flats: Planes n . x = d of flat faces, (k, 4).
+        only_flats: Whether to leave out planes that are no flat faces.
     """
     planes = []
     for plane in _reflex_planes(body, size):
@@ -107,7 +117,11 @@ def _spare(part: CutPart) -> float:
 
 
 def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
-    """Bisect a hollow free-form shape until its hulls add little volume."""
+    """Bisect a hollow free-form shape until its hulls add little volume.
+
+    Args:
+        size, volume: Of the whole solid, for tolerances.
+    """
     body = part.body.simplify(min(1e-3 * size, 0.01)) if part.body.num_tri() > _FINE_TRIANGLES else part.body
     parts = [CutPart(each, part.planes) for each in body.decompose()]
     spare = [_spare(each) for each in parts]
@@ -122,7 +136,12 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
 
 
 def cut_at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
-    """Cut parts where one round wall ends at another, so that a cylinder and its chamfer are two pieces."""
+    """Cut parts where one round wall ends at another, so that a cylinder and its chamfer are two pieces.
+
+    Args:
+        shafts: Round walls of the solid that are no holes.
+        size: Of the whole solid, [mm].
+    """
     for part in parts:
         # A part with at least six corners on the wall of a shaft is a part of that shaft.
         corners = corners_of(part.body)
@@ -136,7 +155,11 @@ def cut_at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: f
 
 
 def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]:
-    """Return both halves of a part, or the part alone where the plane misses it."""
+    """Return both halves of a part, or the part alone where the plane misses it.
+
+    Args:
+        hair: Distance of a cut from its plane, [mm].
+    """
     height = corners_of(part.body) @ n - d
     is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
     return (part,) if is_beside else part.halves(n, d, hair)
@@ -155,7 +178,11 @@ def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
 
 
 def _reflex_planes(body: Any, size: float) -> Array:
-    """Return planes n . x = d of sides at reflex edges, (k, 4), those with the longest edges first."""
+    """Return planes n . x = d of sides at reflex edges, (k, 4), those with the longest edges first.
+
+    Args:
+        size: Of the whole solid, for tolerances, [mm].
+    """
     mesh = convert_to_mesh(body)
     length = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(length, 1e-300)[:, None]

@@ -138,7 +138,12 @@ def _planes(corners: Array) -> Array:
 
 
 def _cut_at(part: CutPart, fault: _Fault, least: float, hair: float) -> list[CutPart]:
-    """Cut a part through its worst point along the plane whose halves have the least hull volume."""
+    """Cut a part through its worst point along the plane whose halves have the least hull volume.
+
+    Args:
+        least: Smaller bodies are rounding, [mm^3].
+        hair: Distance of a cut from its plane, [mm].
+    """
     normals = fault.normals
     if len(normals) > 1:
         mean = normals.mean(axis=0)

@@ -42,6 +42,9 @@ def name_regions(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
 def rename_faces(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     """Rename some faces; `+z` stands for `pz`, `-z` for `nz`.
 
+    Args:
+        names: Present name -> new name.
+
     Raises:
         InputError: No face has the name, or two would have one.
     """

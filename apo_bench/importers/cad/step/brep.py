@@ -35,7 +35,11 @@ def read_solids(path: Path) -> list[BrepSolid]:
 
 
 def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[BrepSolid]:
-    """Yield the solids in a shape, and its shells that belong to no solid."""
+    """Yield the solids in a shape, and its shells that belong to no solid.
+
+    Args:
+        name: Name of the product; several solids get a number behind it.
+    """
     every = [*_shapes_in(shape, TopAbs.TopAbs_SOLID), *_shapes_in(shape, TopAbs.TopAbs_SHELL, TopAbs.TopAbs_SOLID)]
     if not every and any(_shapes_in(shape, TopAbs.TopAbs_FACE)):
         every = [shape]

@@ -45,6 +45,8 @@ def _leaves_below(label: Any, T: Array, product: str, name: str, colors: Any) ->
     """Yield the leaves below one entry of the tree.
 
     Args:
+        label: The entry of the tree.
+        colors: The colour tool of the document.
         T: (4, 4), pose of the entry's parent in the file, [mm].
         product, name: Names of the parent's part and place, for entries without a name.
     """
@@ -83,7 +85,11 @@ def _name(label: Any) -> str:
 
 
 def _color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
-    """Return the surface colour of an entry of the tree or a shape, else its general colour; None without one."""
+    """Return the surface colour of an entry of the tree or a shape, else its general colour; None without one.
+
+    Args:
+        get: Function that reads a colour of the owner, by kind, into a colour object; False if there is none.
+    """
     color = Quantity.Quantity_Color()
     if not any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen)):
         return None

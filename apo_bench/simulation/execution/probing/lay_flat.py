@@ -56,7 +56,7 @@ def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, g
         The updated grip; the same if the sensor is too noisy.
 
     Raises:
-        ExecutionAborted: It fell out of the hand, or something was struck.
+        ExecutionAborted: The part fell out of the hand, or the arm collided.
     """
     if averaged_s(t.flat, probing.wrist.sigma) > LONGEST_S:
         return grip
@@ -120,10 +120,10 @@ class _Laying:
         self._part = READING_S / averaged
         self._yield = turn_yield(flat)
         self._offset = np.zeros(6)
-        self._turning = np.full(3, _TURN_RAD)
-        self._push = 0.0
+        self._turning = np.full(3, _TURN_RAD)  # averaged angular speed, at first above the limit
+        self._push = 0.0  # averaged push, [N]
         self._calm = 0
-        self._left = round(MOST_S / READING_S)
+        self._left = round(MOST_S / READING_S)  # readings until the time limit
         self.lies = False
 
     def __call__(self, wrench: Array) -> Array | None:
@@ -143,7 +143,7 @@ class _Laying:
         self._push += self._part * (push - self._push)
         calm = abs(self._push - PRESS_N) < CALM * PRESS_N and float(np.abs(self._turning).max()) < CALM_RAD
         self._calm = self._calm + 1 if calm else 0
-        self.lies = self._calm * READING_S >= CALM_S
+        self.lies = self._calm * READING_S >= CALM_S  # `_calm` counts readings in a row
         if self.lies or self._left <= 0 or -float(self._offset[:3] @ self._n) > DEEPEST_M:
             return None
         return self._offset

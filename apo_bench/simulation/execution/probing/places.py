@@ -73,6 +73,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
         return ()
     part, face = found
     T = plan.start[part]
+    # The plane of the floor: n . x = d, world.
     n = T[:3, :3] @ face.normal
     d = float(n @ (T[:3, :3] @ face.outline[0] + T[:3, 3]))
     around = list_obstacles(plan.assembly.solids, plan.start, (part,))
@@ -100,6 +101,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
         for first in free:
             three = [free[first]]
             for third in (_ANGLES // 3, 2 * _ANGLES // 3):
+                # The free place nearest to the exact third of a turn, if there is one.
                 near = sorted(range(-_SLACK, _SLACK + 1), key=abs)
                 three += [free[k] for s in near if (k := (first + third + s) % _ANGLES) in free][:1]
             best = max(best, three, key=len)
@@ -178,7 +180,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
     corners = face.outline @ T[:3, :3].T + T[:3, 3]
     low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
     d = float(n @ corners[0]) - (1e-3 * scene.clearance_mm if face.fit else 0.0)
-    into = n[2] * UP - n
+    into = n[2] * UP - n  # level direction into the wall
     into /= np.linalg.norm(into)
     # The tip looks down, so y = z x x = -up x x. The tip is turned so that `ahead` points into the wall.
     x = ahead[0] * into + ahead[1] * np.cross(into, -UP)
@@ -193,6 +195,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
     low_across = min(float(across @ (box.center - box.half)[:2]) for box in those)
     high_across = max(float(across @ (box.center + box.half)[:2]) for box in those)
     foot = low + min(_OVER_M, (high - low) / 2)
+    # Height over which the side of the fingers and the wall overlap.
     common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))
     level = [max(sides) * ahead + reach_across * across for reach_across in (low_across, high_across)]
     patch = np.array([(*xy, z) for xy in level for z in (reach - common, reach)])

@@ -37,7 +37,7 @@ def touch_side(
         The updated grip; without contact the estimate stays as it was.
 
     Raises:
-        ExecutionAborted: It fell out of the hand, or something was struck.
+        ExecutionAborted: The part fell out of the hand, or the arm collided.
     """
     T = place.T @ grip.T_part_tip
     high = max(t.safe, float(T[2, 3]))

@@ -1,8 +1,8 @@
 """The calibration that a robot estimates by probing during one replay, and the commands that compensate for it.
 
-The robot knows its commands, its encoders, the opening of the gripper, the wrench at its wrist, the plan, the part
-files and the estimated poses of fixed parts. The drawn errors move the hand away from where the robot expects it, as in
-every replay. `estimated_tip` removes them again, since it returns the pose that the encoders show.
+The robot knows its commands, its encoders, the opening of the gripper and the wrench at its wrist. It also knows the
+plan, the part files and the estimated poses of fixed parts. The drawn errors move the hand away from where the robot
+expects it, as in every replay. `estimated_tip` removes them again, since it returns the pose that the encoders show.
 """
 
 from collections.abc import Sequence
@@ -120,6 +120,7 @@ class ProbingState:
         for _ in range(_CORNERS):
             cornered = [self._cornered(touch, patch) for touch, patch in touches]
             self.estimate = before.touch(*(_less_common(before, cornered) if differ else cornered))
+        # From the drawn errors, not from the last residual: the estimate is of the whole errors.
         left = self._error
         E = self.estimate.hand_eye
         tool = np.array(left.tool)
@@ -131,6 +132,7 @@ class ProbingState:
 
     def _cornered(self, touch: Touch, patch: Array) -> Touch:
         """Return the touch with the foremost corner of the patch by the present estimate, or its middle if level."""
+        # Heights of the corners over the face; the lowest one touches.
         ahead = pose.apply(self.estimate.real(touch.T_world_tip, touch.jacobian), patch) @ touch.normal
         flat = float(np.ptp(ahead)) < _FLAT_M
         return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])

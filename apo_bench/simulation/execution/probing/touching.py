@@ -44,10 +44,12 @@ _HIGH_M = 0.1
 
 
 def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
-    """Touch the floor, then walls; the robot updates its calibration estimate after each.
+    """Tare the wrist sensor and, with the action `touch`, touch the floor, then walls.
+
+    The calibration estimate is updated after the floor, after the walls, and after the two opposite touches.
 
     Raises:
-        ExecutionAborted: The hand struck something, or a place is out of reach.
+        ExecutionAborted: The hand collided, or a place is out of reach.
     """
     robot.stage = TOUCHING
     probing.begin(robot)
@@ -55,6 +57,7 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
         return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
+        # Found with the present estimate, whose uncertainty sets how far before a face a touch begins.
         those = places(probing.plan, robot.scene, partial(_stand_off, robot, probing))
         touches = list[tuple[Touch, Array]]()
         for place in those:
