@@ -100,6 +100,7 @@ class ContactJudge(NamedTuple):
         # Two measurements per case: reached (even indices), true (odd indices).
         found = self.known.measure((c.contact, poses) for c in cases for poses in (c.poses, c.true))
         common = [each.common if isinstance(each, Mate) else each for each in found]
+        # even: reached, odd: true
         shares = compute_covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
         return tuple(self._verdict(*each) for each in zip(cases, found[::2], shares.tolist(), strict=True))
 

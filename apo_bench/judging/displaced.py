@@ -91,7 +91,7 @@ def faults_of_place(
             if b in displaced and _is_mate(assembly, contacts, b, seen):
                 yield f"{b} against {a}", displaced[b]
             continue
-        put = after[max(last.get(a, 0), last.get(b, 0))]
+        put = after[max(last.get(a, 0), last.get(b, 0))]  # when the later of both was placed
         if put is not None:
             held = _held(known, contacts, (a, b), final.poses[a], seen)
             slid = _slid(assembly, (a, b), put.poses, final.poses, held)

@@ -109,9 +109,10 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
     common = Meetings(assembly).measure_overlaps(
         ((c, at) for each in (seen, true) for at in list_alternatives(each) for c, _ in contacts),
     )
+    # first half: at `seen`, second half: at `true`
     reached, expected = common[: len(common) // 2], common[len(common) // 2 :]
     covered = compute_covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
-    covered[[not overlap for overlap in expected]] = np.nan
+    covered[[not overlap for overlap in expected]] = np.nan  # the truth itself has no overlap
     return np.asarray(covered.reshape(count, -1).min(axis=1, initial=1.0))
 
 

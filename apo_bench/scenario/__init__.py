@@ -1,4 +1,4 @@
-"""Scenarios: files, checks and layouts."""
+"""Scenarios: read and check scenario files, and draw the layout of a trial."""
 
 from apo_bench.scenario.attach_lines import list_nominal_operations
 from apo_bench.scenario.file import find_scenario_path, is_named, list_scenario_names, load_scenario

@@ -1,4 +1,4 @@
-"""Lines on which parts come to their nominal poses."""
+"""The insertion axis of every operation of a scenario, as stated in its file or planned, and checks of stated ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,24 +14,26 @@ from apo_bench.scenario.layout import find_nominal_start
 from apo_bench.scenario.scenario import Scenario
 
 _THROUGH = 1e-3
-"""Cosine to the normal of a face above which a direction leads through it."""
+"""A direction leads through a face if its cosine to the normal of the face is larger."""
 
 
 @lru_cache(maxsize=32)
 def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
-    """The operations of a scenario at its nominal poses."""
+    """The planned insertion of every operation of a scenario, at its nominal poses."""
     lines = [attach.stated for attach in scenario.attach]
     return understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
 
 
 def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
-    """The scenario with the line of attach of every operation.
+    """Return the scenario with the insertion axis of every operation.
 
     Args:
-        stated: What the file says of them.
+        stated: Direction and length that the file states for each operation, if any.
+        file: Name of the file, for messages.
 
     Raises:
-        InputError: A stated direction leads through what the part has to touch, or a stated line begins inside of it.
+        InputError: A stated direction leads through a face that the part touches, or a stated line begins inside
+            another part.
     """
     operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated)
     for each, preference in zip(operations, stated, strict=True):
@@ -40,7 +42,13 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
 
 
 def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
-    """Whether a stated line can be one at all."""
+    """Raise an `InputError` if a stated direction or length of an insertion is impossible.
+
+    Args:
+        after: The planned arrival at the goal.
+        key: File and key, for messages.
+        main: Name of the moved part.
+    """
     if stated.direction is not None:
         way = after.T[:3, :3] @ stated.direction
         through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)

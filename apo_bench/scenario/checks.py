@@ -1,4 +1,4 @@
-"""Checks that the numbers of a scenario fit its topology, wherever the truth may vary to."""
+"""Check that the poses of a scenario agree with its contacts, in the nominal layout and at the limits of variation."""
 
 from collections.abc import Iterator
 from itertools import combinations, product
@@ -15,35 +15,35 @@ from apo_bench.scenario.play import without_play
 from apo_bench.scenario.scenario import Scenario
 
 _GAP_M = 1e-6
-"""Faces of a contact are nearer than this."""
+"""Largest gap between the faces of a contact."""
 _ANGLE_DEG = 0.01
-"""Normals of faces of a contact are opposite within this, and axes parallel."""
+"""Largest angle between one normal and the opposite of the other, or between the axes, of a contact."""
 DEEP_M = 2e-5
-"""Parts that are deeper in each other do not only touch: pieces of an import may be so deep."""
+"""Largest overlap of parts that only touch; pieces of imported parts may overlap that much."""
 
 _Pair = tuple[str, str, bytes]
-"""Two parts, and where the second one is to the first."""
+"""Two parts, and the rounded pose of the second in the frame of the first, as bytes."""
 _Faults = Iterator[tuple[str, str]]
-"""Key to blame, and what is wrong."""
+"""Key in the file that causes a fault, and the fault as a sentence."""
 
 
 class _Case(NamedTuple):
-    """A layout that the scenario can draw."""
+    """A layout to check."""
 
     layout: Layout
     key: str = ""
-    """The key to blame for what is wrong only here."""
+    """Key in the file that causes a fault in this layout; empty for the nominal layout."""
     words: str = ""
-    """Where it is, to follow a sentence."""
+    """Description of the layout, appended to a sentence."""
     site_only: bool = False
-    """Only the site differs from the nominal layout: what moves as one needs no second look."""
+    """True if only the site differs from the nominal layout, so that parts which move with it need no second check."""
 
 
 def check_layouts(scenario: Scenario, file: str) -> None:
     """Check the nominal layout, both ends of every `vary`, and the corners of the site.
 
     Raises:
-        InputError: The first thing found wrong.
+        InputError: The first fault that is found.
     """
     tight = without_play(scenario.assembly, scenario.clearance_mm)
     require(tight is None, f"{file}, operations, contacts: {tight}; make the hole wider, or fit with a clearance.")
@@ -57,6 +57,7 @@ def check_layouts(scenario: Scenario, file: str) -> None:
 
 
 def _cases(scenario: Scenario) -> Iterator[_Case]:
+    """Yield the layouts to check: nominal, both ends of every shift and turn, and the corners of the site."""
     site = scenario.site
     x, y = site.center_m
     middle = sum(site.yaw_rad) / 2
@@ -81,7 +82,12 @@ def _cases(scenario: Scenario) -> Iterator[_Case]:
 
 
 def _faults(scenario: Scenario, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
-    """All that is wrong in one layout."""
+    """Yield all faults of one layout.
+
+    Args:
+        stages: Poses of all parts at the start and after each operation.
+        apart: Pairs of parts that were found apart before; extended.
+    """
     airborne = find_part_in_the_air(scenario.assembly, case.layout.start)
     if airborne is not None:
         part, sentence = airborne
@@ -92,7 +98,7 @@ def _faults(scenario: Scenario, case: _Case, stages: tuple[Poses, ...], apart: s
 
 
 def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
-    """Parts that do not turn about the vertical only: the robot does not turn parts over."""
+    """Yield operations that tilt a part, since the robot turns parts about the vertical only."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
         tilt = float(np.degrees(measure_angle(before[2, :3], stages[k + 1][operation.main][2, :3])))
@@ -104,11 +110,11 @@ def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
 
 
 def _open_contacts(scenario: Scenario, case: _Case, stages: tuple[Poses, ...]) -> _Faults:
-    """Contacts that are not closed after the operation that makes them."""
+    """Yield contacts that are not closed after the operation that makes them."""
     standing = scenario.assembly.fixed - scenario.follows_site
     for k, operation in enumerate(scenario.assembly.operations):
         for number, contact in enumerate(operation.contacts, start=1):
-            # When only the site moves, a contact is another one if the face below stays where it is.
+            # If only the site moves, a contact changes only if its environment part does not move with the site.
             if not case.site_only or contact.environment.part in standing:
                 fault = _find_gap(scenario, contact, stages[k + 1])
                 if fault is not None:
@@ -116,7 +122,7 @@ def _open_contacts(scenario: Scenario, case: _Case, stages: tuple[Poses, ...]) -
 
 
 def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
-    """Why a contact is not closed: faces do not look at each other, do not meet, or cover nothing of each other."""
+    """The reason why a contact is not closed, in words: tilt, gap or no overlap; None if it is closed."""
     a, b = map(scenario.assembly.face_of, contact)
     T_a, T_b = (poses[of.part] for of in contact)
     if isinstance(a, Face) and isinstance(b, Face):
@@ -140,7 +146,7 @@ def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
 
 
 def _intrusions(scenario: Scenario, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
-    """Parts that are inside each other, at the start or after an operation."""
+    """Yield pairs of parts that overlap at the start or after an operation."""
     solids = scenario.assembly.solids
     for a, b in combinations(solids, 2):
         depth = _depth(scenario, (a, b), stages[0], apart)
@@ -155,7 +161,7 @@ def _intrusions(scenario: Scenario, stages: tuple[Poses, ...], apart: set[_Pair]
 
 
 def _depth(scenario: Scenario, pair: tuple[str, str], poses: Poses, apart: set[_Pair]) -> float:
-    """How deep two parts are in each other, [m]; 0 if they were found apart before where they are to each other now."""
+    """The depth of overlap of two parts, [m]; 0 if `apart` contains the pair at its present relative pose."""
     a, b = pair
     known = (a, b, (np.round(pose.inverse(poses[a]) @ poses[b], 9) + 0.0).tobytes())
     if known in apart:

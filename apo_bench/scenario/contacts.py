@@ -1,11 +1,11 @@
-"""The contacts of an operation in a scenario file, and the gaps between their faces.
+"""Read the contacts of an operation from a scenario file, with the gaps between their faces.
 
-A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a table that says more:
+A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a table with more keys:
 
     { faces = ["py", "castle1.spy"], kind = "clearance", gap_mm = [-0.2, 0.3] }
 
-`kind` is `centred` (the default), `contact` or `clearance`, see `apo_bench.assembly.topology.Gap`; `gap_mm` goes
-with the last, and stands for all the play of parts that fit if it is left out.
+`kind` is `centred` (the default), `contact` or `clearance`, see `apo_bench.assembly.topology.Gap`. `gap_mm` belongs to
+`clearance`; without it, the interval is the whole play of parts that fit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,15 +28,16 @@ def read_contacts(
     solids: Mapping[str, Solid],
     there: set[str],
 ) -> ContactGaps:
-    """The contacts that one operation makes.
+    """Read the contacts that one operation makes.
 
     Args:
         place: File and operation, for messages.
-        moves: Parts that move; faces of the first need no name before them.
-        there: Parts that stand there before the operation.
+        moves: Parts that move, the main part first; its faces may be named without the part.
+        solids: Part -> solid.
+        there: Parts that are in place before the operation.
 
     Raises:
-        InputError: A contact that makes no sense.
+        InputError: A contact is unknown, repeated or impossible.
     """
     contacts: dict[Contact, Gap] = {}
     for i, entry in enumerate(entries, start=1):
@@ -52,7 +53,11 @@ def read_contacts(
 
 
 def check_kinds(place: str, gaps: Sequence[ContactGaps]) -> None:
-    """Check that a contact that the last of some operations makes again has the same gap as before."""
+    """Raise an `InputError` if the last operation repeats a contact of an earlier one with another gap.
+
+    Args:
+        gaps: The contacts of each operation up to the last.
+    """
     for contact, gap in gaps[-1].items():
         for k, earlier in enumerate(gaps[:-1], start=1):
             wanted = earlier.get(contact, gap)
@@ -64,7 +69,7 @@ def check_kinds(place: str, gaps: Sequence[ContactGaps]) -> None:
 
 
 def _face(name: str, place: str, solids: Mapping[str, Solid], main: str | None = None) -> PartFace:
-    """`part.face`, or a face of the main part."""
+    """The face of a name `part.face`, or of `face` alone, which is a face of the main part."""
     part, dot, face = name.rpartition(".")
     require(dot or main, f"{place}: a face as 'part.face' is needed, '{name}' was given.")
     part = part if dot or main is None else main
@@ -76,7 +81,7 @@ def _face(name: str, place: str, solids: Mapping[str, Solid], main: str | None =
 def _check_contact(
     contact: Contact, place: str, moves: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
 ) -> None:
-    """Check that the first face is of a part that moves, the second of one that rests, and that they make a contact."""
+    """Raise an `InputError` unless a moved part touches a resting one, with faces that can make a contact."""
     above = contact.manipulated.part
     below = contact.environment.part
     require(above in moves, f"{place}, first: '{above}' does not move here; name a face of '{moves[0]}'.")
@@ -90,7 +95,7 @@ def _check_contact(
 
 
 def _described(face: Face | RoundFace) -> str:
-    """What kind of face it is, such as `a hole of 10 mm`."""
+    """The kind of a face in words, such as `a hole of 10 mm`."""
     if isinstance(face, Face):
         return "a flat face"
     if face.kind == "cone":
@@ -101,7 +106,7 @@ def _described(face: Face | RoundFace) -> str:
 
 
 def _gap(table: ContactTable, place: str, contact: Contact, solids: Mapping[str, Solid]) -> Gap:
-    """Return how far apart the faces may be."""
+    """Return the gap of a contact: its kind, and the stated interval in [m]."""
     a, b = (solids[of.part].face(of.face) for of in contact)
     if table.gap_mm is None:
         has_play = a.fit or b.fit or compute_geometric_play(a, b) > 0.0

@@ -1,4 +1,4 @@
-"""Parts and operations out of the tables of a scenario file."""
+"""Read parts and operations from the tables of a scenario file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, Va
 from apo_bench.scenario.values import check_span, normalize_axis
 
 _ARM = "arm"
-"""What the robot is called in a scene."""
+"""Name of the robot in a scene, which no part may have."""
 
 
 class PartEntry(NamedTuple):
@@ -29,11 +29,12 @@ class PartEntry(NamedTuple):
 
     table: PartTable
     path: Path
+    """Its part file."""
     solid: Solid
 
     @property
     def start(self) -> Array:
-        """Where it starts, (4, 4), [m]."""
+        """Its start pose, (4, 4), [m]; the identity if none is stated."""
         return np.eye(4) if self.table.start is None else self.table.start.matrix
 
 
@@ -43,17 +44,21 @@ class OperationEntry(NamedTuple):
     operation: Operation
     gaps: ContactGaps
     goal: Array
-    """(4, 4), frame of the assembly, [m]."""
+    """(4, 4), target pose of the main part, frame of the assembly, [m]."""
     attach: Preference
+    """Stated direction and length of the insertion."""
     grasp: Grasp
     varies: tuple[Shift | Turn, ...]
+    """Variations of the true pose that each trial draws."""
 
 
 def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> Mapping[str, PartEntry]:
-    """Every part; a file that several parts share is loaded once, `checked` as in `load_part`.
+    """Read all parts; a part file that several parts share is loaded once.
 
     Args:
+        tables: Name -> table of the part.
         file: The scenario file; paths are relative to its folder.
+        checked: As in `load_part`.
     """
     solids: dict[Path, Solid] = {}
     parts = {}
@@ -81,7 +86,12 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
 def read_operations(
     tables: Sequence[OperationTable], file: Path, parts: Mapping[str, PartEntry]
 ) -> tuple[OperationEntry, ...]:
-    """Every operation in order, with defaults filled in."""
+    """Read all operations in order, with defaults filled in.
+
+    Args:
+        file: The scenario file, for messages.
+    """
+    # Poses and parts in place, updated after each operation.
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.table.fixed}
     entries: list[OperationEntry] = []
@@ -104,6 +114,13 @@ def _entry(
     poses: Mapping[str, Array],
     there: set[str],
 ) -> OperationEntry:
+    """Read operation k, counted from 0.
+
+    Args:
+        place: File and operation, for messages.
+        poses: Part -> pose before the operation, (4, 4).
+        there: Parts in place before the operation.
+    """
     main = table.move
     _check_movable(main, f"{place}, move", parts)
     for name in table.carries:
@@ -126,18 +143,19 @@ def _entry(
 
 
 def _check_movable(name: str, place: str, parts: Mapping[str, PartEntry]) -> None:
+    """Raise an `InputError` if a part is unknown or fixed."""
     require_known("part", name, parts, place=place)
     require(not parts[name].table.fixed, f"{place}: '{name}' is fixed and cannot be moved; move another part.")
 
 
 def _attach(table: AttachTable, place: str) -> Preference:
-    """What is stated of the line to the goal."""
+    """The stated direction and length [m] of an insertion; None for each that is not stated."""
     direction = None if table.along is None else normalize_axis(table.along, f"{place}, along")
     return Preference(direction, None if table.travel_mm is None else 1e-3 * table.travel_mm)
 
 
 def _vary(table: VaryTable, operation: int, place: str) -> Shift | Turn:
-    """A shift or a turn that each trial draws."""
+    """The shift or turn of a `vary` entry."""
     if table.along is not None and table.mm is not None and table.about is None and table.deg is None:
         low, high = check_span(table.mm, f"{place}, mm")
         return Shift(operation, normalize_axis(table.along, f"{place}, along"), 1e-3 * low, 1e-3 * high)

@@ -27,12 +27,12 @@ from apo_bench.scenario.values import check_span, normalize_axis
 
 
 def list_scenario_names() -> tuple[str, ...]:
-    """The short names of the scenarios that come with the package."""
+    """The names of the scenarios in the package, sorted."""
     return tuple(sorted(path.stem for path in folder("scenarios").glob("*.toml")))
 
 
 def is_named(given: str) -> bool:
-    """Whether something is the name of a scenario that every installation has, so that no file has to travel."""
+    """True if `given` names a scenario of the package or a generated one, which every installation has."""
     return is_generated(given) or given in list_scenario_names()
 
 
@@ -61,10 +61,12 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
 
 @lru_cache(maxsize=128)
 def _load_named(name: str) -> Scenario:
+    """Load a scenario of the package or a generated one, whose part files need no check."""
     return replace(_read(find_scenario_path(name), checked=not is_generated(name)), name=name)
 
 
 def _read(path: Path, checked: bool = True) -> Scenario:
+    """Read and check a scenario file; `checked` as in `load_part`."""
     document = read_typed(path, ScenarioTable, "scenario file")
     require(
         not UNSHOWN.search(path.stem),
@@ -76,7 +78,7 @@ def _read(path: Path, checked: bool = True) -> Scenario:
 
 
 def find_scenario_path(given: str | Path) -> Path:
-    """The file of a scenario, as `load_scenario` finds it; a generated one is written first."""
+    """The path of a scenario file; a generated scenario is written first."""
     if is_generated(given):
         return make_generated_file(str(given))
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
@@ -88,7 +90,7 @@ def find_scenario_path(given: str | Path) -> Path:
 
 
 def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, tuple[Preference, ...]]:
-    """The scenario without lines of attach, and what the file states of them."""
+    """The scenario without insertion axes, and the preferences for them that the file states per operation."""
     parts = read_parts(top.parts, path, checked)
     entries = read_operations(top.operations, path, parts)
     assembly = Assembly(
@@ -132,6 +134,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
 
 
 def _site(table: SiteTable, place: str) -> Site:
+    """The site of a `[site]` table, in m and radians."""
     x, y = table.center_mm
     wide, deep = table.spread_mm
     low, high = np.radians(check_span(table.yaw_deg, f"{place}, yaw_deg"))
@@ -139,6 +142,7 @@ def _site(table: SiteTable, place: str) -> Site:
 
 
 def _human_error(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
+    """The human error of a `[human_error]` table; its direction must be horizontal at the goal."""
     known = 1 <= table.operation <= len(entries)
     require(known, f"{place}, operation: an operation from 1 to {len(entries)} is needed, {table.operation} was given.")
     axis = normalize_axis(table.along, f"{place}, along")

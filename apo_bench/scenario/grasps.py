@@ -1,4 +1,4 @@
-"""Grasps of parts: as a scenario file states them, or where the shape of a part offers one."""
+"""Choose the grasp of a part: as the scenario file states it, or found from the shape of the part."""
 
 import numpy as np
 
@@ -19,26 +19,28 @@ from apo_bench.scenario.tables import GraspTable
 from apo_bench.scenario.values import normalize_axis
 
 _RAISED = 0.15
-"""Height of a grasp over the middle of the part, as a part of the height of the part."""
+"""Height of a default grasp above the middle of the part, as a fraction of the height of the part."""
 _OPENING_M = 0.046
-"""How far each finger of the arm that comes with the benchmark opens."""
+"""Largest opening of each finger of the default arm."""
 _MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
-"""Width that the arm can hold where the file does not say how: so much space its fingers need before they close."""
+"""Largest width of a part for a default grasp; open fingers need `FINGER_ROOM_M` of free space."""
 MOST_TILT_DEG = 45.0
-"""A hand is tilted by no more."""
+"""Largest tilt of the gripper from straight down."""
 _LEVEL = 1e-6
-"""Vertical component below which a unit vector is level."""
+"""A unit vector is horizontal if its vertical component is smaller."""
 
 
 def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: Array) -> Grasp:
-    """The grasp; unless the file says otherwise, above the middle, across the narrower level axis of a part of boxes.
+    """Read a grasp, and fill in what the file does not state.
 
-    Where that leaves pads off the part, and of other parts, it is the best place that the shape offers.
+    The default for a part of boxes is above the middle, across the narrower horizontal axis. If the pads would miss the
+    part there, and for other parts, the default is the best place that the shape offers.
 
     Args:
+        stated: The `grasp` table.
         place: File and key, for messages.
         part: Name of the part.
-        before: Where it stands when it is picked, (4, 4).
+        before: (4, 4), pose of the part when it is picked.
     """
     if stated.ahead is not None:
         return _tilted(stated, place, solid, before)
@@ -60,7 +62,10 @@ def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: 
 
 
 def _across_boxes(point: Array, across: Array | None, solid: Solid, before: Array) -> Grasp | None:
-    """Across what is stated, else across the narrower level axis; None if there are not two."""
+    """The grasp at a point across the stated axis, else across the narrower horizontal axis of the part.
+
+    None if no axis is stated and the part has fewer than two horizontal axes.
+    """
     level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
     low, high = solid.bounds
     if across is None and len(level) >= 2:
@@ -69,7 +74,7 @@ def _across_boxes(point: Array, across: Array | None, solid: Solid, before: Arra
 
 
 def _check_within_reach(point: Array, place: str, solid: Solid, before: Array) -> None:
-    """A point is in the box around a part, or so far over it as pads reach down."""
+    """Raise an `InputError` unless a point is in the bounding box of the part, or above by at most the pad height."""
     low, high = solid.bounds
     over = PAD_M[1] * np.round(before[2, :3], 9)
     ends = np.minimum(low, low + over), np.maximum(high, high + over)
@@ -79,7 +84,7 @@ def _check_within_reach(point: Array, place: str, solid: Solid, before: Array) -
 
 
 def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Grasp:
-    """A grasp of which the file says all, with fingers that point along `ahead`."""
+    """A tilted grasp, with fingers that point along `ahead`; the file must state all of it."""
     if stated.at_mm is None or stated.across is None or stated.ahead is None:
         raise InputError(f"{place}, ahead: 'at_mm' and an axis 'across' are needed with it.")
     ahead = normalize_axis(stated.ahead, f"{place}, ahead")
@@ -91,6 +96,7 @@ def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Gras
         f"{place}, ahead: an axis within {MOST_TILT_DEG:g} degrees of straight down is needed, {tilt:.3g} are given.",
     )
     point = 1e-3 * np.array(stated.at_mm)
+    # The point must be in the part's extent along each axis of the hand; against `ahead` it may exceed it.
     for axis, over in ((across, 0.0), (np.cross(ahead, across), 0.0), (-ahead, PAD_M[1])):
         low, high = measure_extent(solid.pieces, axis)
         inside = low - _LEVEL <= point @ axis <= high + over + _LEVEL
@@ -99,12 +105,15 @@ def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Gras
 
 
 def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
-    """Whether this is a grasp of a part of boxes, with the part between the pads."""
+    """True if the part consists of boxes and lies between the pads; T is its pose (4, 4) when it is picked."""
     return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(T[2, :3], 9))
 
 
 def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, solid: Solid, T: Array) -> Grasp:
-    """The best place for pads; of those that are near to what is stated, if something is."""
+    """The best grasp that the shape offers, across the stated axis if there is one.
+
+    With a stated point the grasp is at that point, across the axis of the nearest grasp of the shape.
+    """
     grasps = [Grasp(hold.point, hold.across) for hold in find_holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
     if across is not None:
         grasps = [grasp for grasp in grasps if abs(grasp.across @ across) > 1.0 - _LEVEL]
@@ -121,7 +130,7 @@ def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, s
 
 
 def _above_middle(solid: Solid, T: Array) -> Array:
-    """Over the middle of the part as it stands, so that fingers which reach below it clear what it stands on."""
+    """A point (3,) above the middle of the part, frame of the part, so that fingertips clear the ground below it."""
     low, high = solid.bounds
     up = T[2, :3]
     point: Array = (low + high) / 2 + _RAISED * (np.abs(up) @ (high - low)) * up

@@ -1,4 +1,4 @@
-"""The spread of a human error to parts that are put against a displaced one."""
+"""Propagate a human error: later parts that are placed against a displaced part are displaced too."""
 
 from typing import NamedTuple
 
@@ -9,33 +9,34 @@ from apo_bench.geometry import Array
 from apo_bench.scenario.scenario import Scenario
 
 NOTHING_M = 1e-9
-"""A part that is displaced by less is where it should be."""
+"""A smaller displacement counts as none."""
 _SWEEPS = 40
+"""Largest number of sweeps over the guiding faces; oblique faces need several until they agree."""
 _AGREED_M = 1e-12
-"""Walls that are not at right angles to each other are followed in turn, so often, until all agree to within this."""
+"""The sweeps end when all guiding faces agree within this."""
 
 _Displaced = dict[str, Array]
-"""Part -> how far it lies from its true place, (3,), world, [m]."""
+"""Part -> displacement from its true position, (3,), world, [m]."""
 
 
 class ErrorSpread(NamedTuple):
-    """The error that each operation inherits from a wrong one."""
+    """The displacements that follow from one wrong operation."""
 
     offsets: Array
-    """(n, 3): how far each operation puts its main part from its goal, in the frame of that part, [m]."""
+    """(n, 3): displacement of the main part of each operation from its goal, in the frame of that part, [m]."""
     left: tuple[str, ...]
-    """Parts that the last operation would leave displaced, in the order in which they were put down."""
+    """Parts, other than that of the last operation, that are displaced at the end, in the order of placing."""
 
 
 def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpread:
-    """Follow the human error through the demonstration.
+    """Propagate the human error through the demonstration.
 
-    A later part whose contact with a displaced one has a normal along the displacement goes along with it, by that
-    component: it is guided by the face. Where no contact says otherwise a part goes to its true place. The last
-    operation shows what is wrong, so it follows nothing.
+    A face of a displaced part guides a later part: it displaces that part by the component along the normal. Without
+    such a contact a part goes to its true place. The last operation is never displaced, so that the error shows.
 
     Args:
-        offset: (3,), [m], in the frame of the main part of the wrong operation.
+        layout: The true poses.
+        offset: (3,), [m], error of the wrong operation, in the frame of its main part.
     """
     assembly = scenario.assembly
     offsets = np.zeros((len(assembly), 3))
@@ -55,7 +56,10 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
 
 
 def compute_human_error_covariance(scenario: Scenario, human_error_scale: float) -> Array:
-    """(n, 6, 6) [m^2]: the mean square of each operation's error along its own direction, zero where there is none."""
+    """The covariance (n, 6, 6) [m^2] of the body twists that the human error gives each operation.
+
+    It is the mean square of the displacement along its direction, and zero for operations without one.
+    """
     covariance = np.zeros((len(scenario.assembly), 6, 6))
     if scenario.human_error is not None:
         rms = human_error_scale * scenario.human_error.rms_m
@@ -65,10 +69,11 @@ def compute_human_error_covariance(scenario: Scenario, human_error_scale: float)
 
 
 def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
-    """Return how far the faces of displaced parts guide a part off its place, (3,), world, [m]."""
+    """Return the displacement of a part that is guided by faces of displaced parts, (3,), world, [m]."""
     shift = np.zeros(3)
     touched = find_touched_contacts(assembly, operation.contacts, operation.moves, poses)
     guides = [each for each in touched if each.rests in displaced]
+    # Project onto one face after the other, until all agree.
     for _ in range(_SWEEPS):
         for each in guides:
             shift += each.normal * (each.normal @ (displaced[each.rests] - shift))
@@ -78,7 +83,13 @@ def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _
 
 
 def _displaced(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:
-    """What is displaced after an operation that turned its parts and put the main one `error` from its goal."""
+    """The displaced parts after an operation.
+
+    Args:
+        turn: (3, 3), rotation of the moved parts by the operation, world.
+        error: (3,), displacement of the main part from its goal, world, [m].
+        before: The displaced parts before the operation.
+    """
     main = before.get(operation.main, np.zeros(3))
     after = {**before, operation.main: error}
     for part in operation.carries:

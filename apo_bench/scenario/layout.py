@@ -1,4 +1,4 @@
-"""Layouts: the true poses of a trial, drawn from a seed."""
+"""Layouts: draw the true poses of a trial from a seed."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -51,11 +51,16 @@ def place_layout(
     clearance_mm: float = 0.0,
     turns_rad: Sequence[float] | None = None,
 ) -> Layout:
-    """The layout with the assembly at (x, y), turned by yaw about the vertical, given shifts and turns (none: zero).
+    """Compute the layout for given values of all variations.
 
-    Without a clearance it is that of the nominal parts.
+    Target poses are T_world_assembly T_assembly_part, each shifted, then turned, in the frame of its own part.
 
-    Goals are T_world_assembly T_assembly_part, each shifted, then turned, in the frame of its own part.
+    Args:
+        x_m: Position of the assembly on the table, like `y_m`.
+        yaw_rad: Rotation of the assembly about the vertical.
+        shifts_m: One per shift of the scenario. Default: zeros.
+        clearance_mm: Clearance per side; parts that stand on a fit face start lower by it.
+        turns_rad: One per turn of the scenario. Default: zeros.
     """
     T_world_assembly = pose.at((x_m, y_m, 0.0), (0.0, 0.0, np.degrees(yaw_rad)))
     goals = T_world_assembly @ scenario.nominal_poses
@@ -70,7 +75,7 @@ def place_layout(
 
 
 def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
-    """The start of the physical part: let down until its lowest point is where the nominal one was."""
+    """The start pose (4, 4) of a part with clearance: lowered until its lowest point is at that of the nominal part."""
     solid = scenario.assembly.solids[part]
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not solid.fits:
         return T
@@ -82,7 +87,7 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
 
 
 def find_nominal_start(scenario: Scenario) -> Poses:
-    """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
+    """The start pose (4, 4) of every part in the frame of the assembly, with the site in the middle of its range."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad
     back = pose.inverse(pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2]))
@@ -90,16 +95,16 @@ def find_nominal_start(scenario: Scenario) -> Poses:
 
 
 class Layouts(NamedTuple):
-    """The truth of many trials."""
+    """The true poses of n trials."""
 
     poses: Array
-    """(n, k, 4, 4): of k operations, world frame, [m]."""
+    """(n, k, 4, 4): target poses of k operations, world frame, [m]."""
     start: Poses
-    """Part -> (n, 4, 4)."""
+    """Part -> start poses, (n, 4, 4), world frame, [m]."""
 
 
 def draw_layouts(scenario: Scenario, rng: np.random.Generator, n: int) -> Layouts:
-    """Draw layouts one after the other, as `draw_layout` does."""
+    """Draw n layouts one after the other with `draw_layout`."""
     layouts = [draw_layout(scenario, rng) for _ in range(n)]
     goals = np.array([layout.poses for layout in layouts])
     return Layouts(goals, {part: np.array([layout.start[part] for layout in layouts]) for part in scenario.start})

@@ -1,4 +1,4 @@
-"""Checks that operations follow from each other."""
+"""Check the order of operations: carried parts are connected, moves change a pose, and no part is left in the air."""
 
 import numpy as np
 
@@ -7,17 +7,18 @@ from apo_bench.errors import require
 from apo_bench.geometry import TOUCH_M, measure_drop, measure_drop_depths
 
 _SAME = 1e-9
-"""Poses that differ by less, [m] and unitless, are one and the same."""
+"""Poses that differ by less in every component are equal."""
 
 
 def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> None:
-    """Check what is carried and what is moved again.
+    """Check carried parts and parts that are moved again.
 
     Args:
-        stages: Where every part stands before the first operation and after each.
+        stages: Poses of all parts before the first operation and after each one.
+        file: Name of the file, for messages.
 
     Raises:
-        InputError: The first thing found wrong.
+        InputError: The first fault that is found.
     """
     for k, operation in enumerate(assembly.operations):
         loose = _loose(assembly, k)
@@ -41,7 +42,7 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
 
 
 def _left_in_the_air(assembly: Assembly, k: int) -> str | None:
-    """A part that was put down before and, after operation k, has no contact left."""
+    """The first part that was placed and has no contact left after operation k, counted from 0; None if none."""
     put = {part for operation in assembly.operations[: k + 1] for part in operation.moves}
     known = assembly.first(k + 1)
     held = {part for relation in known.relations() if relation.lost is None for part in _ends(relation.contact)}
@@ -49,7 +50,7 @@ def _left_in_the_air(assembly: Assembly, k: int) -> str | None:
 
 
 def _loose(assembly: Assembly, k: int) -> str | None:
-    """A part that operation k carries and that does not hang together with its main part."""
+    """The first carried part of operation k that no chain of contacts connects with the main part; None if none."""
     operation = assembly.operations[k]
     standing = [_ends(relation.contact) for relation in assembly.first(k).relations() if relation.lost is None]
     together = {operation.main}
@@ -59,15 +60,20 @@ def _loose(assembly: Assembly, k: int) -> str | None:
 
 
 def _ends(contact: Contact) -> set[str]:
+    """The two parts of a contact."""
     return {contact.manipulated.part, contact.environment.part}
 
 
 AIR_M = 1e-4
-"""Lower above what is below it, a part settles within the first steps, at its start."""
+"""A part that starts lower above its support settles within the first simulation steps."""
 
 
 def find_part_in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
-    """The first movable part that starts more than so much above what is below it, and where it is, in words."""
+    """Find the first movable part that starts more than `most_m` above its support.
+
+    Returns:
+        Name of the part, and the fault as a sentence; None if there is no such part.
+    """
     for part, solid in assembly.solids.items():
         others = {name: other for name, other in assembly.solids.items() if name != part}
         way = np.array([most_m])

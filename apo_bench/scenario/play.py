@@ -1,15 +1,15 @@
-"""Checks that shafts have play in their holes."""
+"""Check that every shaft has play in its hole, with the clearance of the parts."""
 
 from apo_bench.assembly import Assembly, classify_contact, compute_geometric_play, compute_play_mm
 from apo_bench.errors import require
 from apo_bench.scenario.scenario import Scenario
 
 _NO_PLAY_MM = 1e-6
-"""A shaft with less play is as thick as its hole."""
+"""Less play counts as none."""
 
 
 def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
-    """Why the first shaft that is as thick as its hole, or thicker, has no play there; None if all have some."""
+    """Describe the first contact of a shaft without play in its hole; None if all shafts have play."""
     for contact in (contact for operation in assembly.operations for contact in operation.contacts):
         a, b = map(assembly.face_of, contact)
         if classify_contact(a, b) == "shaft in hole" and (compute_play_mm(a, b, clearance_mm) or 0.0) <= _NO_PLAY_MM:
@@ -20,10 +20,10 @@ def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
 
 
 def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
-    """Check a clearance that replaces the scenario's.
+    """Check a clearance per side that replaces the one of the scenario.
 
     Raises:
-        InputError: It leaves a shaft no play in its hole.
+        InputError: A shaft would have no play in its hole.
     """
     tight = without_play(scenario.assembly, clearance_mm)
     require(tight is None, f"a clearance of {clearance_mm:g} mm was given, with which {tight}; give more.")

@@ -1,4 +1,4 @@
-"""Copy a scenario with its parts to a folder."""
+"""Save a scenario: copy its file and its part files to a folder."""
 
 from pathlib import Path
 from shutil import copyfile
@@ -9,6 +9,7 @@ from apo_bench.io import read_text, write_file
 from apo_bench.scenario.scenario import Scenario
 
 _LARGEST_BYTES = 1 << 22
+"""Largest size of a scenario file."""
 
 
 @check_arguments

@@ -1,4 +1,4 @@
-"""A scenario: one demonstration as a recipe."""
+"""The data of a scenario: parts, operations, grasps, and the variation of layout and human error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from apo_bench.records import Meaning, Thresholds
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """Where the gripper holds the main part, from above or tilted."""
+    """The place and direction of a grasp on the main part, from above or tilted."""
 
     point: Array
     """Centre between the fingertips, (3,), part frame, [m]."""
     across: Array
     """Unit vector along which the fingers close, (3,), part frame, horizontal when the part stands at its start."""
     half_width: float | None = None
-    """Of what is held there, [m], where that is known."""
+    """Half the width of the part there, [m]; None if unknown."""
     ahead: Array | None = None
     """Unit vector along which the fingers point, (3,), part frame, square to `across`; None: straight down."""
 
@@ -37,7 +37,7 @@ class Grasp:
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """How far the truth of an operation may vary along a direction that no contact fixes."""
+    """A variation of the true pose of an operation: a shift along a direction that no contact fixes."""
 
     operation: int
     """Counted from 0."""
@@ -54,7 +54,7 @@ class Shift:
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """How far the truth of an operation may turn about an axis, where no contact fixes that."""
+    """A variation of the true pose of an operation: a rotation about an axis that no contact fixes."""
 
     operation: int
     """Counted from 0."""
@@ -69,7 +69,7 @@ class Turn:
         freeze(self, axis=(3,), point=(3,))
 
     def by(self, rad: float) -> Array:
-        """The turn by an angle, (4, 4), in the frame of the part: T = P R P^-1 with P to the point."""
+        """The displacement (4, 4) for an angle, in the frame of the part: P R P^-1, P the translation to the point."""
         there = pose.at(self.point)
         return there @ pose.exp(np.concatenate([np.zeros(3), rad * self.axis])) @ pose.inverse(there)
 
@@ -77,20 +77,20 @@ class Turn:
 @final
 @dataclass(frozen=True)
 class Site:
-    """The place of the assembly: a rigid planar pose, drawn uniformly per seed."""
+    """The range of the pose of the assembly on the table, which is drawn uniformly per seed."""
 
     center_m: tuple[float, float] = (0.0, 0.0)
     spread_m: tuple[float, float] = (0.0, 0.0)
-    """Half widths."""
+    """Half widths of the range along x and y."""
     yaw_rad: tuple[float, float] = (0.0, 0.0)
-    """Lowest and highest turn about the vertical."""
+    """Lowest and highest rotation about the vertical."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class HumanError:
-    """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
+    """The error of the human in one operation: an offset of random sign, with a uniform size between two bounds."""
 
     operation: int
     """Counted from 0."""

@@ -1,4 +1,4 @@
-"""The tables of a scenario file, with their keys and values."""
+"""The schema of a scenario file: the keys of its tables, with the types and limits of their values."""
 
 from dataclasses import fields
 from typing import Annotated, Any, Literal
@@ -12,8 +12,11 @@ from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.scenario.values import LARGEST_LENGTH_MM, Angle, Axis, Length, Point, Pose
 
 _LARGEST_CLEARANCE_MM = 5.0
+"""Largest clearance per side, and largest `gap_mm`."""
 _MOST_UNDERSIZE_MM = 1.0
+"""Largest absolute undersize of a fit face."""
 _LARGEST_ERROR_MM = 100.0
+"""Largest human error."""
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 _HalfWidth = Annotated[float, Meta(ge=0.0, le=LARGEST_LENGTH_MM)]
 _Error = Annotated[float, Meta(ge=0.0, le=_LARGEST_ERROR_MM)]
@@ -30,7 +33,7 @@ class PartTable(FileTable, frozen=True, kw_only=True):
     start: Pose | None = None
     color: tuple[_Share, _Share, _Share] | None = None
     fit: dict[str, _Undersize] = msgspec.field(default_factory=dict)
-    """Face -> by how much it lies deeper in the part than its file says, [mm]."""
+    """Face that recedes by the clearance -> undersize, [mm], see `with_fit`."""
 
 
 class ContactTable(FileTable, frozen=True, kw_only=True):
@@ -42,14 +45,14 @@ class ContactTable(FileTable, frozen=True, kw_only=True):
 
 
 class AttachTable(FileTable, frozen=True, kw_only=True):
-    """`attach`: what is stated of the line to the goal."""
+    """`attach`: stated direction and length of the insertion."""
 
     along: Axis | None = None
     travel_mm: Annotated[float, Meta(gt=0.0, le=LARGEST_LENGTH_MM)] | None = None
 
 
 class GraspTable(FileTable, frozen=True, kw_only=True):
-    """`grasp`: what is stated of the place where the gripper holds the part."""
+    """`grasp`: stated place and directions of the grasp."""
 
     at_mm: Triple | None = None
     across: Axis | None = None
@@ -103,11 +106,11 @@ JudgeTable = msgspec.defstruct(
     ],
     bases=(FileTable,),
 )
-"""`[judge]`: what counts as success, and thresholds."""
+"""`[judge]`: the meaning of success, and the thresholds of the judge."""
 
 
 class ScenarioTable(FileTable, frozen=True, kw_only=True):
-    """A whole file."""
+    """All tables of a scenario file."""
 
     schema: Literal[1]
     title: Text

@@ -1,4 +1,4 @@
-"""Values in a scenario file: poses, axes, spans."""
+"""Types of values in scenario files: lengths, poses, axes and intervals, with their checks."""
 
 from typing import Annotated
 
@@ -10,8 +10,9 @@ from apo_bench.geometry import Array, pose
 from apo_bench.io import FileTable, Quadruple, Triple, check_quaternion
 
 LARGEST_LENGTH_MM = 2000.0
-"""No length in a scenario is larger: the room of an arm on a table."""
+"""Largest length in a scenario, beyond the reach of an arm on a table."""
 _FARTHEST_MM = 1e5
+"""Largest coordinate of an `AnyPose`."""
 Length = Annotated[float, Meta(ge=-LARGEST_LENGTH_MM, le=LARGEST_LENGTH_MM)]
 Point = tuple[Length, Length, Length]
 """[mm]."""
@@ -20,6 +21,7 @@ Angle = Annotated[float, Meta(ge=-360.0, le=360.0)]
 _Far = Annotated[float, Meta(ge=-_FARTHEST_MM, le=_FARTHEST_MM)]
 Axis = str | Triple
 """`"x"`, `"+x"`, `"-x"` ... or three numbers."""
+# Name of an axis, with or without a sign -> unit vector.
 _AXES = {f"{sign}{'xyz'[i]}": value * np.eye(3)[i] for sign, value in (("", 1), ("+", 1), ("-", -1)) for i in range(3)}
 
 
@@ -36,7 +38,7 @@ class Pose(FileTable, frozen=True, kw_only=True):
 
 
 class AnyPose(FileTable, frozen=True, kw_only=True):
-    """A pose whose turn is stated in one of three ways."""
+    """A pose whose rotation is stated as angles or as a quaternion in either order of components."""
 
     at_mm: tuple[_Far, _Far, _Far]
     turn_deg: tuple[Angle, Angle, Angle] | None = None
@@ -47,7 +49,7 @@ class AnyPose(FileTable, frozen=True, kw_only=True):
         """(4, 4), [m].
 
         Raises:
-            InputError: The turn is stated twice, or a quaternion is not of length 1.
+            InputError: The rotation is stated twice, or a quaternion is not of length 1.
         """
         stated = [turn for turn in (self.turn_deg, self.quaternion_wxyz, self.quaternion_xyzw) if turn is not None]
         require(len(stated) <= 1, f"{place}: turn_deg and quaternions state the same; keep one.")
@@ -59,10 +61,13 @@ class AnyPose(FileTable, frozen=True, kw_only=True):
 
 
 def normalize_axis(stated: Axis, place: str) -> Array:
-    """A unit vector, (3,).
+    """The unit vector (3,) of a stated axis: `x`, `+x`, `-x`, ..., or three numbers.
+
+    Args:
+        place: File and key, for messages.
 
     Raises:
-        InputError: It is no axis.
+        InputError: The name is unknown, or all numbers are zero.
     """
     needed = f"{place}: an axis is needed: x, y, z with or without a sign, or three numbers that are not all zero."
     if isinstance(stated, str):
@@ -74,10 +79,10 @@ def normalize_axis(stated: Axis, place: str) -> Array:
 
 
 def check_span(span: tuple[float, float], place: str) -> tuple[float, float]:
-    """A lowest and a highest number.
+    """Return an interval unchanged.
 
     Raises:
-        InputError: They stand the other way round.
+        InputError: The first number is larger than the second.
     """
     require(span[0] <= span[1], f"{place}: a lowest and a highest number are needed, in this order.")
     return span

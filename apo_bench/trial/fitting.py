@@ -65,7 +65,7 @@ class FittingPlan:
             return ""
         mains = [operation.main for operation in self.plan.assembly.operations]
         named = [
-            # A boolean factor leaves out rotations that print as 0.0.
+            # The boolean factor omits rotations that would print as 0.0.
             f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm" + f" and {turn_deg:.1f} deg" * (turn_deg >= 0.05)
             for k, shift_mm, turn_deg in self.moves
         ]
@@ -181,6 +181,7 @@ def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact, [m], one array for each time before parts are taken apart again."""
     return [
         build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        # The last entry is the end of the plan; the search itself keeps those contacts.
         for upto, goals in list_poses_in_force(plan)[:-1]
     ]
 

@@ -143,6 +143,7 @@ def even_points(dimensions: int) -> Iterator[Array]:
     for _ in range(30):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1.0)
+    # multiples of the steps modulo 1, mapped to normal quantiles
     points = norm.ppf((0.5 + np.arange(1, _TRIED + 1)[:, None] * steps) % 1.0)
     yield from points[np.argsort((points * points).sum(axis=1), kind="stable")]
 
@@ -208,7 +209,7 @@ class _Search(NamedTuple):
         """(G, h) so that each measure in excess at s is repaired to first order where G s' >= h."""
         # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
         now = self.excess(self.space.tangent(s))
-        over = now > 0.0
+        over = now > 0.0  # only measures in excess are linearised
         ends = [self.excess(self.space.tangent(s + _STEP * axis))[over] for axis in np.eye(len(s))]
         G = -(np.array(ends).T - now[over][:, None]) / _STEP
         return G, G @ s + now[over] + _BEYOND

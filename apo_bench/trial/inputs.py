@@ -111,7 +111,7 @@ def module_files(module: str) -> tuple[Path, ...]:
     spec = find_spec(top) or find_own_module(top)
     if spec is None or not spec.has_location or spec.origin is None:
         return ()
-    # of a package one folder above its own
+    # The folder that holds the module: parents[0] of a file, parents[1] of the `__init__.py` of a package.
     home = Path(spec.origin).parents[spec.submodule_search_locations is not None]
     others = ["apo_bench"]
     if home in {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}:

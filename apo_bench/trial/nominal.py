@@ -33,6 +33,7 @@ def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
         return np.concatenate([L @ twist for L, twist in zip(factors, twists, strict=True)])
 
     start = _first_guess(nominal[observed], observation.poses[observed])
+    # scales of x, y [m] and yaw [rad]
     return np.asarray(_planar(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
 
 
@@ -42,7 +43,7 @@ def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
     # of the whole motion from nominal to observed only the yaw and the shift on the table are taken
     T = observation.poses[k] @ pose.inverse(nominal[k])
     flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
-    flat[:2, 3] = (observation.poses[k] - flat @ nominal[k])[:2, 3]
+    flat[:2, 3] = (observation.poses[k] - flat @ nominal[k])[:2, 3]  # shift in x and y
     return np.asarray(flat @ nominal)
 
 

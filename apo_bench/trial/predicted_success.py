@@ -213,8 +213,9 @@ def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator
 
 def _widths(space: FreeSpace) -> Array:
     """Standard deviation of draws along free directions, (f,), relative to the stated one, bounded by `_FARTHEST_*`."""
+    # largest translation of an operation, (f,)
     far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
-    turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
+    turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD  # largest rotation
     return np.asarray(1.0 / np.maximum(1.0, np.maximum(far, turned)))
 
 
@@ -248,6 +249,7 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
         ends: From `_by_arm`; empty: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
+    # |cosine| of each insertion axis with the vertical
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
     # per operation, for `_within`
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]

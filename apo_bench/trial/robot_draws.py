@@ -85,7 +85,7 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
             # touch points on the part
             felt = np.array([place.point for place in t.side_touches]) if t.side_touches else t.flat.feet
             lever = float(np.linalg.norm(felt - felt.mean(axis=0), axis=1).max())
-            told = TOUCH_SIGMA_M / lever
+            told = TOUCH_SIGMA_M / lever  # standard deviation of the rotation measured by touch [rad]
             # Twist index 2: z along the pads, corrected; index 3: rotation, reduced to what touches leave.
             slip[2:4] *= 0.0, told / np.hypot(told, np.radians(slip_deg))
         if t.side_touches or t.front is not None:

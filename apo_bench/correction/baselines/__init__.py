@@ -1,1 +1,1 @@
-"""Baselines that `contact` is compared with: the correctors of the paper, and other methods."""
+"""Baseline correctors that `contact` is compared with: those of the paper, and other methods."""

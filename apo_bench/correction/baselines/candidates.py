@@ -1,8 +1,8 @@
-"""Which motion parameters to adjust (Section 3.3.2): from arcs that fail to all that hangs together with them.
+"""Choice of the motion parameters to adjust (Section 3.3.2): those of failing arcs, and all connected to them.
 
-An arc of the relation graph is all contacts that one operation makes between one pair of parts. It joins the motion
-parameters in the ODLs that its two parts had when it was made; so it does after it has disappeared. A stable object
-has no ODL, nor has a part that was never moved: nothing is connected through them.
+An arc of the relation graph is all contacts that one operation makes between one pair of parts. It connects the motion
+parameters in the ODLs of its two parts at that time, also after it has disappeared. Fixed parts and parts that were
+never moved have no ODL, so nothing is connected through them.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ def candidates(assembly: Assembly, failing: NDArray[np.bool_]) -> tuple[int, ...
 
 
 def _connected(chosen: frozenset[int], graph: Sequence[frozenset[int]]) -> frozenset[int]:
-    """With everything that is joined to it, however far away."""
+    """The chosen operations and all that are connected to them, directly or indirectly."""
     while True:
         grown = chosen.union(*(arc for arc in graph if arc & chosen))
         if grown == chosen:
@@ -36,7 +36,7 @@ def _connected(chosen: frozenset[int], graph: Sequence[frozenset[int]]) -> froze
 
 
 def _arcs(assembly: Assembly) -> list[frozenset[int]]:
-    """The operations in the ODLs of both ends of each contact, of the time it was made."""
+    """The operations in the ODLs of both ends of each contact, when it was made."""
     history = assembly.odls()
     return [
         frozenset(term.operation for end in relation.contact for term in history[relation.made].get(end.part, ()))

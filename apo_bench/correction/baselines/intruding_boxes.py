@@ -1,8 +1,8 @@
-"""Boxes of parts in contact that are inside each other, written as face contact equations.
+"""Penetration of boxes of parts in contact, as face contact equations, for the baseline `penalty`.
 
 The deepest corner v of one box behind the side n of the other has e = n D_a^-1 D_b v = -depth, the form of Eq. 26, so
-the Jacobian of contacts serves here too. Of the six directions along which two boxes may part, those normal to their
-sides, the shortest way out counts; cross products of edges are left aside, and so are pieces that are no boxes.
+the Jacobian of contacts applies. Only the six normals of sides are tested as ways out, not the cross products of edges.
+Pieces that are no boxes are ignored.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,9 @@ from apo_bench.geometry import Array, Box, pose
 @final
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """q pairs of boxes; each may be measured from either side, so every word comes forwards and backwards."""
+    """The q pairs of boxes that may penetrate; each may be measured from either side, so words come in both
+    directions.
+    """
 
     words: Equations
     """No equations; 2 w words: D_a^-1 D_b of each arc of the relation graph, then D_b^-1 D_a."""
@@ -31,7 +33,7 @@ class Meeting:
 
 
 def meeting(assembly: Assembly, system: Equations) -> Meeting:
-    """Every box of one part with every box of the other, of all parts that an operation brings into contact.
+    """Every pair of boxes of two parts that an operation brings into contact.
 
     Args:
         system: All equations, in the order of `assembly.relations()`.
@@ -64,15 +66,16 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
 
 
 def _boxes(assembly: Assembly, part: str) -> list[Box]:
+    """The boxes among the pieces of a part."""
     return [piece for piece in assembly.solids[part].pieces if isinstance(piece, Box)]
 
 
 def intruding(meetings: Meeting, poses: Array) -> Equations:
-    """One equation, with e = -depth, for each two boxes that are inside each other at these poses."""
+    """One equation, with e = -depth, for each pair of boxes that penetrate at these poses, (n, 4, 4)."""
     T = _between(meetings.words, poses)[meetings.word]
     depth, axis, sign, reversed_ = _shortest(meetings, T)
     inside = np.flatnonzero(depth > 0)
-    side = reversed_[inside].astype(np.intp)
+    side = reversed_[inside].astype(np.intp)  # 0: the side is one of a; 1: one of b
     axis = axis[inside]
     sign = sign[inside]
     plane = np.zeros((len(inside), 4))
@@ -95,7 +98,7 @@ def intruding(meetings: Meeting, poses: Array) -> Equations:
 
 
 def _between(words: Equations, poses: Array) -> Array:
-    """D_a^-1 D_b of every arc, (w, 4, 4)."""
+    """The pose of part b in the frame of part a, D_a^-1 D_b, for every arc, (w, 4, 4)."""
     half = len(words.letters) // 2
     F = np.concatenate([words.start, poses, np.eye(4)[None]])[words.letters[:half]]
     F = np.where(words.inverse[:half, :, None, None], pose.inverse(F), F)
@@ -106,11 +109,15 @@ def _between(words: Equations, poses: Array) -> Array:
 
 
 def _shortest(meetings: Meeting, T: Array) -> tuple[Array, NDArray[np.intp], Array, NDArray[np.bool_]]:
-    """Depth along the shortest way out, (q,), its axis, its sign, and whether it is a side of b that is left behind."""
+    """The shortest way out of each pair: depth, (q,), axis, sign, and whether the side is one of b.
+
+    Args:
+        T: The pose of part b in the frame of part a for each pair, (q, 4, 4).
+    """
     a, b = meetings.centers
     half_a, half_b = meetings.halves
     R = T[:, :3, :3]
-    # Middles of b seen from a, and of a from b; a box reaches |R| half along the axes of the other one.
+    # Offset of the centres along the axes of a, and of b; a box has half length |R| half on the axes of the other one.
     way_a = np.einsum("qij,qj->qi", R, b) + T[:, :3, 3] - a
     way_b = -np.einsum("qij,qi->qj", R, way_a)
     spread = np.abs(R)

@@ -15,19 +15,21 @@ from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
 CONTACT_M = 1e-6
-"""Stated standard deviation of a contact, tuned."""
+"""Assumed standard deviation of a contact, tuned, [m]."""
 _TOLERANCE = 1e-12
+"""Tolerance of steps, cost and gradient."""
 EVALUATIONS = 300
+"""Most evaluations of the cost."""
 
 
 def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> Correction:
-    """The poses with the least sum of squares.
+    """The poses with the least sum of squares of contact errors and corrections.
 
     Args:
         contact_m: Standard deviation of e, [m].
 
     Returns:
-        `converged` with the gap that is left in the sentence, or `not_seen`; `not_finite` if a number overflowed.
+        `converged` with the remaining gap in the sentence, or `not_seen`; `not_finite` if a number overflowed.
 
     Raises:
         InputError: A covariance is not positive definite.
@@ -38,6 +40,7 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
 
 
 def _solve(observation: Observation, contact_m: float) -> Array:
+    """The poses, (n, 4, 4), that minimise the cost."""
     from scipy.optimize import least_squares as minimised
 
     space = whitened(observation)

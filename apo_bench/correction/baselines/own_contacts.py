@@ -1,7 +1,7 @@
-"""Solve a pose for the contacts of its own operation alone.
+"""Solve one pose for the contacts that its own operation makes, with all other poses fixed.
 
-A pose that is no candidate is executed all the same, and a small error in it does harm: a fixture put down tilted stays
-wedged in the fingers that let go of it.
+Poses that are not adjusted otherwise are executed too, and small errors in them do harm: a fixture put down tilted
+stays wedged in the fingers that release it.
 """
 
 from apo_bench.assembly import (
@@ -12,10 +12,12 @@ from apo_bench.geometry import Array
 
 
 def solve_own_contacts(system: Equations, poses: Array, k: int, gap_m: float) -> Array:
-    """The poses (n, 4, 4) with that of operation k solved for what it makes, unless that opens a contact that held.
+    """The poses, (n, 4, 4), with that of operation k solved for the contacts that it makes.
+
+    The poses are returned unchanged if that would open a contact that held, or if a number is not finite.
 
     Args:
-        system: All equations that the pose has to respect, those of other operations too.
+        system: All equations that must not be violated, those of other operations too.
         gap_m: Largest |e| at which a contact holds, [m].
     """
     solution = solve_newton(system.among(system.made == k), poses, (k,))

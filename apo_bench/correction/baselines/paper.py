@@ -1,4 +1,4 @@
-"""The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
+"""The corrector `paper`: the method of the paper on the whole graph after the whole demonstration (Section 3.3)."""
 
 from apo_bench.assembly import Correction, Observation, build_contact_equations, find_largest_residual
 from apo_bench.correction.baselines.candidates import candidates
@@ -8,7 +8,7 @@ from apo_bench.correction.solvers import solve_newton
 
 
 def paper(observation: Observation) -> Correction:
-    """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other pose by itself.
+    """Solve for the motion parameters that Section 3.3.2 chooses, then each other pose for its own contacts.
 
     Returns:
         `converged` if every |e| is within `observation.gap_m`; otherwise `not_seen` (nothing was changed),

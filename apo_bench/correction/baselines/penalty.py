@@ -24,14 +24,17 @@ from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
 PENALTY_CONTACT_M = 1e-4
-"""Gap or depth that costs as much as one standard deviation of noise, tuned on seeds that no table uses."""
+"""Gap or depth that costs as much as one standard deviation of noise, [m]; tuned on seeds that no table uses."""
 ADAM_STEPS = 600
+"""Number of steps of Adam."""
 LENGTH = 0.2
-"""Step of Adam at the beginning, in standard deviations, tuned likewise."""
+"""Step size of Adam at the start, in standard deviations, tuned on the same seeds."""
 _MEAN = 0.9
+"""Decay rate of Adam's mean of the gradient, as its authors recommend."""
 _SQUARE = 0.999
+"""Decay rate of Adam's mean of the squared gradient, as its authors recommend."""
 _TINY = 1e-8
-"""Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
+"""Keeps Adam from dividing by 0."""
 
 
 def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, length: float = LENGTH) -> Correction:
@@ -57,7 +60,7 @@ def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, l
 @final
 @dataclass(frozen=True, eq=False)
 class Loss:
-    """What is gone down, as a function of z."""
+    """The loss that is minimised, as a function of z."""
 
     space: WhitenedPoses
     contacts: Equations
@@ -83,6 +86,7 @@ def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss
 
 
 def _descend(observation: Observation, contact_m: float, length: float) -> Array:
+    """The poses, (n, 4, 4), after the last step of Adam."""
     down = loss(observation, contact_m)
     z = np.zeros(6 * len(observation.poses))
     m = np.zeros_like(z)

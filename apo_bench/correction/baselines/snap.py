@@ -1,8 +1,7 @@
-"""A baseline: every part snaps onto what it is put on, as parts do in an editor, and nothing is ever taken back.
+"""A baseline: every part snaps to its newest support, as in an editor, and earlier poses are never corrected.
 
-Operation by operation, the new pose alone is solved for the contacts that its own operation makes; earlier poses stay
-as they are. Where earlier errors leave no place at which all of them hold, their gaps are as small as can be in the
-sense of least squares.
+Operation by operation, only the new pose is solved for the contacts that its own operation makes. Where earlier errors
+make these contacts impossible together, their gaps are minimised in the sense of least squares.
 """
 
 import numpy as np
@@ -14,13 +13,14 @@ from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
 _ITERATIONS = 30
+"""Most iterations per pose."""
 
 
 def snap(observation: Observation) -> Correction:
-    """Each pose onto the contacts of its own operation, by the most likely twist, in the order of the operations.
+    """Move each pose onto the contacts of its own operation, by the most likely twist, in the order of the operations.
 
     Returns:
-        `converged` with the gap that is left in the sentence, or `not_seen`.
+        `converged` with the remaining gap in the sentence, or `not_seen`.
 
     Raises:
         InputError: A covariance is not positive definite.
@@ -29,6 +29,7 @@ def snap(observation: Observation) -> Correction:
 
 
 def _snap_all(observation: Observation) -> Array:
+    """The poses, (n, 4, 4), after each was moved onto its own contacts."""
     poses = np.array(observation.poses)
     space = whitened(observation)
     system = build_contact_equations(observation.assembly, observation.start, poses)
@@ -38,11 +39,11 @@ def _snap_all(observation: Observation) -> Array:
 
 
 def _put(own: Equations, poses: Array, k: int, space: WhitenedPoses) -> Array:
-    """The pose of operation k, (4, 4), nearest to the seen one of those with the least sum of squared gaps.
+    """The pose of operation k, (4, 4), nearest to the observed one among those with the least sum of squared gaps.
 
     At each iteration the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15
-    and 22), and the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t
-    covariance V)^-1 (c + V^t xi).
+    and 22). The others go to where |z| is least. With V^t d = c for the fixed directions, the twist is covariance V
+    (V^t covariance V)^-1 (c + V^t xi).
     """
     coordinates = WhitenedPoses(space.observed[k : k + 1], space.factor[k : k + 1])
     now = np.array(poses)

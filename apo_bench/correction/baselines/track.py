@@ -1,8 +1,8 @@
-"""Tracking (Section 4.2): correct after each observed operation, and reach back only as far as it takes.
+"""The corrector `paper-track` (Section 4.2): correct after each observed operation, reaching back as far as necessary.
 
-The robot has done operations 1 .. n-1 by the poses in force when it observes the n-th. If the contacts that this one
-makes do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do; then the robot takes the work
-apart back to the oldest of them and builds it again. The result is a schedule of do and undo steps.
+The robot has done operations 1 .. n-1 with the current poses when it observes operation n. If the contacts of that
+operation do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do. Then the robot disassembles
+back to the oldest of them and assembles again. The result is a schedule of do and undo steps.
 """
 
 from collections.abc import Callable, Iterable
@@ -33,7 +33,7 @@ _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
 
 
 def paper_track(observation: Observation) -> Correction:
-    """Follow the human step by step, freeing the 1, 2, .. most recent candidates.
+    """Correct step by step, freeing the 1, 2, .. most recent candidates.
 
     Returns:
         As `paper`; `freed` is what successful trials changed, `tried` every trial, rank and trace those of the last
@@ -43,17 +43,17 @@ def paper_track(observation: Observation) -> Correction:
 
 
 def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
-    """The most recent candidate, the two most recent ones, and so on."""
+    """The sets of the 1, 2, .. most recent candidates."""
     return (chosen[:k] for k in range(1, len(chosen) + 1))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class TrackedOperation:
-    """What one more operation asked for."""
+    """The result of the correction after one more operation."""
 
     poses: Array
-    """(n + 1, 4, 4): the poses now in force; those before if nothing sufficed."""
+    """(n + 1, 4, 4): the new poses; unchanged if no set sufficed."""
     status: str
     freed: tuple[int, ...] = ()
     tried: tuple[FreeingTrial, ...] = ()
@@ -62,7 +62,7 @@ class TrackedOperation:
 
 
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
-    """Every operation in turn, trying these sets of its candidates."""
+    """Correct after every operation in turn, trying the sets of candidates that `sets` returns."""
     if not observation.observed.all():
         return refuse_correction(observation)
     now = np.array(observation.poses)
@@ -81,13 +81,16 @@ def track_operations(observation: Observation, sets: _Sets) -> Correction:
 
 
 def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
-    """Undo n-1 .. i, then do i .. n, for the oldest freed operation i; nothing is undone if that is n itself."""
+    """The steps after operation n was observed: undo n-1 .. i, then do i .. n, with i the oldest freed operation.
+
+    Nothing is undone if none was freed, or i is n itself.
+    """
     i = min(freed, default=n)
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
 def next_operation(observation: Observation, poses: Array, sets: _Sets) -> TrackedOperation:
-    """What one more operation asks for: the last of these poses has just been observed, the others are in force."""
+    """Correct after one more operation: the last of these poses was just observed, the others are current."""
     n = len(poses) - 1
     system = build_contact_equations(observation.assembly.first(n + 1), observation.start, poses)
     failing = ~(system.gaps(poses) <= observation.gap_m)
@@ -110,7 +113,11 @@ def next_operation(observation: Observation, poses: Array, sets: _Sets) -> Track
 def _trial(
     system: Equations, poses: Array, free: tuple[int, ...], failing: NDArray[np.bool_]
 ) -> tuple[Solution, float]:
-    """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
+    """Solve all equations that contain a free motion parameter.
+
+    Returns:
+        The solution, and the largest |e| of these equations and of contacts that had failed, [m].
+    """
     chosen = system.containing(free)
     solution = solve_newton(system.among(chosen), poses, free)
     return solution, find_largest_residual(system.gaps(solution.poses)[chosen | failing])
@@ -123,6 +130,7 @@ def _report(
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
+    """The correction of the whole demonstration."""
     system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     status = steps[-1].status if steps else "converged"
     last = next((step for step in reversed(steps) if step.trace), TrackedOperation(poses, status))

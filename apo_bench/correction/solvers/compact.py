@@ -1,10 +1,10 @@
-"""The contact equations in their smallest form: three per contact, whatever the number of vertices.
+"""Contact equations in compact form: three per contact, whatever the number of vertices.
 
-The vertices of a face lie in a plane, so e, which is linear in them, is known everywhere once it is known at their
-centre, and how fast it grows along two directions. Scaled by the square root of the number of vertices, and with
-directions that have the same second moments as the centred vertices, these three have the same sum of squares as e of
-all vertices. Nothing is lost, and the matrices are smaller by a quarter. The largest of the three is not the largest e
-of a vertex: e at the centre of v vertices counts sqrt(v) times.
+The vertices of a face lie in a plane and e is linear in them. So e is determined by its value at their centre and its
+growth along two directions. The centre is scaled by the square root of the number of vertices, and the directions have
+the same second moments as the centred vertices. Then the three equations have the same sum of squares as e of all
+vertices. Nothing is lost, and the matrices are smaller by a quarter. The largest of the three is not the largest e of a
+vertex: e at the centre of v vertices counts sqrt(v) times.
 
 Every array may have leading axes: many observations of one assembly are linearised at once.
 """
@@ -23,14 +23,15 @@ from apo_bench.correction.solvers.word_products import Words, words_of
 from apo_bench.geometry import GENERATORS, Array
 
 _LEAST_PIVOT = 1e-15
+"""Least pivot relative to the mean square of the offsets of the vertices, for vertices on a line."""
 _LEAST_SQUARE = 1e-300
-"""Pivots of vertices on a line, as part of the mean square of their ways, and of vertices that coincide."""
+"""Least pivot, [m^2], for vertices that coincide."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CompactEquations:
-    """c contacts with three equations each, in the motion parameters of n operations."""
+    """The equations of c contacts, three each, in the motion parameters of n operations."""
 
     words: Words
     """D_a^-1 D_b of each contact."""
@@ -39,7 +40,7 @@ class CompactEquations:
     plane: Array
     """(c, 4): n of Eq. 1, frame of the manipulated part."""
     points: Array
-    """(*, c, 3, 4): what stands for the vertices, homogeneous; the last two are directions."""
+    """(*, c, 3, 4): three homogeneous points that stand for the vertices, a scaled centre and two directions."""
 
     def __len__(self) -> int:
         return len(self.plane)
@@ -50,31 +51,31 @@ class CompactEquations:
         return self.words.n
 
     def only(self, some: Any) -> CompactEquations:
-        """The equations of some of the observations, if each has points of its own."""
+        """The equations of some of the observations, if each has its own points; else unchanged."""
         return self if self.points.ndim == 3 else replace(self, points=self.points[some])
 
     def among(self, contacts: NDArray[np.bool_]) -> CompactEquations:
-        """The equations of these contacts, (c,), alone."""
+        """The equations of the chosen contacts, (c,), alone."""
         points = self.points[..., contacts, :, :]
         return CompactEquations(self.words.among(contacts), self.constants, self.plane[contacts], points)
 
     def forms(self, T: Array) -> Array:
-        """n D_a^-1 D_b of each contact, (*, c, 4), at the poses T, (*, n, 4, 4): e of any vertex is this times it."""
+        """n D_a^-1 D_b of each contact, (*, c, 4), at the poses T, (*, n, 4, 4); its product with any vertex is e."""
         return np.asarray((self.plane[:, None] @ self.words.products(self.constants, T))[..., 0, :])
 
     def residual(self, T: Array) -> Array:
-        """e of every equation, (*, 3 c), at the poses T, (*, n, 4, 4), [m]."""
+        """The residual e of every equation, (*, 3 c), at the poses T, (*, n, 4, 4), [m]."""
         e = self.points @ self._reached(self.words.prefixes(self.constants, T))[..., 6:]
         return np.asarray(e.reshape(*T.shape[:-3], 3 * len(self)))
 
     def linearise(self, T: Array, B: Array | None) -> Linearised:
         """Linearise every equation at the poses T, (*, n, 4, 4): df/dq of Eq. 10.
 
-        By the derivatives of the paper's appendix, which hold at dq = 0. A contact sees its word move by one twist,
-        which is the sum of what its letters make of theirs (`Words.adjoints`).
+        It uses the derivatives of the paper's appendix, which hold at dq = 0. A contact depends on the twist of its
+        word, which is the sum of the contributions of its letters (`Words.adjoints`).
 
         Args:
-            B: (*, n, 6, 6), the body twist of each pose per unit of its coordinates; None stands for the twists.
+            B: (*, n, 6, 6), the body twist of each pose per unit of its coordinates; None: coordinates are the twists.
         """
         prefixes = self.words.prefixes(self.constants, T)
         reached = self._reached(prefixes)
@@ -86,23 +87,23 @@ class CompactEquations:
         return Linearised(reached[..., 6], e, equations[..., :6], turned)
 
     def _reached(self, prefixes: Array) -> Array:
-        """n G D_a^-1 D_b of each contact for the six unit twists G, and without one, (*, c, 4, 7)."""
+        """n G D_a^-1 D_b of each contact for the six unit twists G, and at last without one, (*, c, 4, 7)."""
         words = np.swapaxes(prefixes[..., -1, :, :, :], -1, -2)
         return np.asarray(words.take(self.words.of, axis=-3) @ self._reach)
 
     @cached_property
     def _reach(self) -> Array:
-        """n G, (c, 4, 7)."""
+        """n G for the six unit twists, and n, (c, 4, 7)."""
         return np.swapaxes((self.plane @ _TWISTS_AND_ONE).reshape(len(self), 7, 4), 1, 2)
 
 
 class Linearised(NamedTuple):
-    """Equations at some poses, and their derivative in two factors: of contacts, and of letters."""
+    """Equations at some poses, with their derivative as a product of a factor per contact and a factor per letter."""
 
     forms: Array
     """(*, c, 4), as of `CompactEquations.forms`."""
     e: Array
-    """(*, 3 c), [m]."""
+    """(*, 3 c), residuals, [m]."""
     rows: Array
     """(*, c, 3, 6), the derivative of e by the twist of its word, in the frame of the manipulated part."""
     turned: Array
@@ -114,7 +115,7 @@ _TWISTS_AND_ONE = np.ascontiguousarray(np.swapaxes(np.concatenate([GENERATORS, n
 
 
 def build_compact_equations(system: Equations, n: int) -> CompactEquations:
-    """Equations in compact form: three per contact, in the motion parameters of `n` operations."""
+    """Convert equations to compact form: three per contact, in the motion parameters of `n` operations."""
     words = words_of(system.letters, system.inverse, len(system.start), n)
     plane = np.zeros((len(words), 4))
     plane[system.contact] = system.plane
@@ -123,23 +124,23 @@ def build_compact_equations(system: Equations, n: int) -> CompactEquations:
 
 
 def linearise_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, Array]:
-    """e, (*, 3 c), [m], at the poses T, (*, n, 4, 4), and its derivative by z, transposed, (*, 6 n, 3 c).
+    """The residual e, (*, 3 c), [m], at the poses T, (*, n, 4, 4), and its transposed derivative by z, (*, 6 n, 3 c).
 
     Args:
-        B: (*, n, 6, 6) or (*, n, 6, 6 n): what a change of z makes of the body twist of each pose.
+        B: (*, n, 6, 6) or (*, n, 6, 6 n): derivative of the body twist of each pose by z.
     """
     known, J = linearise_densely(system, T, B)
     return known.e, np.swapaxes(J, -1, -2)
 
 
 def linearise_densely(system: CompactEquations, T: Array, B: Array) -> tuple[Linearised, Array]:
-    """The same with all that is known there, and the derivative as it is, (*, 3 c, 6 n)."""
+    """The linearised equations, and the derivative by z, (*, 3 c, 6 n); arguments as in `linearise_by`."""
     shared = B.shape[-1] != 6
     known = system.linearise(T, None if shared else B)
     words = system.words
     lead = T.shape[:-3]
     g = len(words.letters)
-    # What z makes of the twist of each word, (*, g, 6, 6 n).
+    # Derivative of the twist of each word by z, (*, g, 6, 6 n).
     moved = np.zeros((*lead, g * 36 * words.n))
     if words.once:
         moved[..., words.entries] = known.turned
@@ -154,11 +155,15 @@ def linearise_densely(system: CompactEquations, T: Array, B: Array) -> tuple[Lin
 
 
 def moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
-    """The centre of the vertices (m, 3) of each contact and two directions, (c, 3, 4), with the same moments.
+    """The scaled centre of the vertices of each contact and two directions with the same second moments, (c, 3, 4).
 
-    Vertices of one contact stand next to each other, and each contact has some. They lie in a plane, so the sum S of
-    off off^t, over their ways off the centre, is a a^t + b b^t: two steps of a Cholesky factorisation that takes the
-    largest pivot first.
+    The sum S of off off^t over the offsets from the centre has rank 2, since the vertices lie in a plane. So S = a a^t
+    + b b^t, by two steps of a Cholesky factorisation with the largest pivot first.
+
+    Args:
+        vertex: (m, 3), [m]; those of one contact are consecutive.
+        contact: (m,), the contact of each vertex.
+        c: Number of contacts, each with at least one vertex.
     """
     points = np.zeros((c, 3, 4))
     if not c:

@@ -25,12 +25,13 @@ from apo_bench.assembly import Equations, Iterate, find_largest_residual
 from apo_bench.geometry import Array
 
 LENGTH_M = 0.04
-"""Way of a point per radian, at which a rotation weighs as much as a translation."""
+"""Length per radian at which a rotation counts as much as a translation."""
 SINGULAR_CUT_OFF = 0.02
 """Singular values below this part of the largest one count as zero (w_l+1 .. w_n of Eq. 15, W = diag(w_j))."""
 _ITERATIONS = 30
+"""Most iterations."""
 REST_M = 1e-9
-"""Scaled step below which the solver has come to rest."""
+"""Length of a scaled step below which the solver has converged, [m]."""
 
 
 @final
@@ -41,26 +42,29 @@ class Solution:
     poses: Array
     """(n, 4, 4); the given ones, if a number was not finite on the way."""
     gap_m: float
-    """Largest |e| at these poses."""
+    """Largest |e| at these poses, [m]."""
     rank: int
-    """Directions that the equations fix, at these poses."""
+    """Number of directions that the equations fix at these poses."""
     at_rest: bool
+    """Whether the solver converged."""
     finite: bool
+    """Whether all numbers stayed finite."""
     trace: tuple[Iterate, ...]
 
 
 def solve_newton(
     equations: Equations, poses: Array, free: Collection[int], *, cut_off: float = SINGULAR_CUT_OFF
 ) -> Solution:
-    """Change the free poses, as little as the contacts ask for, until the equations hold or nothing moves any more.
+    """Change the free poses as little as possible, until the equations hold or the solver converges.
 
-    The rank counts where the solver rests, not where it begins: if noise made it look larger on the way, the way is
-    gone once more, with no more directions than that.
+    The rank at the solution counts. If noise made the rank look larger on the way, the descent is repeated with the
+    rank limited to it.
 
     Args:
         equations: All equations that contain a free motion parameter.
-        poses: (n, 4, 4), where to begin, world frame, [m].
+        poses: (n, 4, 4), the start, world frame, [m].
         free: Operations whose motion parameters may change, counted from 0.
+        cut_off: Relative singular value below which it counts as zero.
     """
     solution = _descend(equations, poses, free, cut_off)
     if solution.at_rest and any(iterate.rank > solution.rank for iterate in solution.trace):
@@ -73,11 +77,15 @@ def solve_newton(
 def _descend(
     equations: Equations, poses: Array, free: Collection[int], cut_off: float, at_most: int | None = None
 ) -> Solution:
-    """One descent: at each iteration T <- T dT(dq), q <- 0, of the rank that the cut-off finds or `at_most`."""
+    """One descent: each iteration sets T <- T dT(dq), q <- 0.
+
+    Args:
+        at_most: Upper limit of the rank; None: the rank that the cut-off gives.
+    """
     now = np.array(poses)
     changing = np.array(sorted(free), dtype=np.intp)
     trace = list[Iterate]()
-    # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 12 with scaled unknowns).
+    # Columns of angles are scaled to lengths, so that one cut-off serves all (Eq. 12 with scaled unknowns).
     units = np.array([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
     for iteration in range(_ITERATIONS + 1):

@@ -1,9 +1,9 @@
-"""What the play of parts that fit does to the contact equations: by how much each is off, and which are off together.
+"""Covariance of the contact equations from play: how far each may be off, and which are off together.
 
-Two parts that fit are off by one displacement, uniform within the play along every normal at which they fit: faces
-that look opposite ways are off by the same amount. In a round hole it is anywhere in a disc. A part that is carried
-inside another one also shifts within their play until it is let go of, so its later contacts are off by where it lay in
-its carrier before, and by where it lies then: play adds up along what is carried.
+Two parts that fit are off by one displacement, uniform within the play along every normal at which they fit. So faces
+with opposite normals are off by the same amount. In a round hole the displacement is anywhere in a disc. A part that is
+carried inside another one also shifts within their play until it is released. Its later contacts are off by its shift
+in the carrier before and by its shift then, so play adds up along carried parts.
 """
 
 from collections.abc import Mapping
@@ -16,28 +16,29 @@ from apo_bench.assembly import Assembly, Contact, PartFace, find_contact_pattern
 from apo_bench.geometry import Array, copy_frozen, remember
 
 LARGEST_CORRELATED = 300
-"""Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""
+"""Number of contacts above which plays count as independent, since their covariance is a dense matrix."""
 _DISC = sqrt(3.0) / 2.0
-"""A component of a point that is anywhere in a disc deviates by this part of one that is anywhere in an interval."""
+"""Standard deviation of a component uniform in a disc, relative to one that is uniform in an interval."""
 _Loose = Mapping[Contact, float]
-"""By how much each contact may be off, as a part of the largest play."""
+"""Contact -> how far it may be off, as a fraction of the largest play."""
 
 
 class _Shift(NamedTuple):
-    """One displacement of a part within another one, in the frame of the part; equal ones are the same."""
+    """Key of one displacement of a part within another one, in the frame of the part."""
 
     part: str
     other: str
     made: int
     """The operation that brought them together."""
     until: int
-    """The operation after which it is asked for: that one, or one that carried the part."""
+    """The last operation at which the displacement is taken: `made`, or an operation that carried the part."""
 
 
 @remember
 def count_plays(assembly: Assembly, play_m: float) -> tuple[Array, float]:
-    """How many independent plays each contact is off by, (c,), in the order of `relations()`, and how large one is,
-    [m].
+    """The number of independent plays by which each contact is off, (c,), in the order of `relations()`.
+
+    A play counts by its squared size. The second value is the unit, the largest play, [m].
     """
     shifts, unit_m = _shifts(assembly, play_m)
     return copy_frozen(np.array([sum(float(n @ n) for n in own.values()) for own in shifts])), unit_m
@@ -45,10 +46,10 @@ def count_plays(assembly: Assembly, play_m: float) -> tuple[Array, float]:
 
 @remember
 def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
-    """The covariance of the compact equations that play causes, (3 c, 3 c), [m^2]; None of too many, or without play.
+    """The covariance of the compact equations from play, (3 c, 3 c), [m^2]; None without play or for too many contacts.
 
-    Only the first row of each contact, its centre, goes with others: what turns parts within their play turns each in
-    its own way.
+    Only the first equation of each contact, that of the centre, is correlated with others: rotations within the play
+    are independent.
     """
     shifts, _ = _shifts(assembly, play_m)
     count, unit_m = count_plays(assembly, play_m)
@@ -58,6 +59,7 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
         shift: 3 * i
         for i, shift in enumerate(dict.fromkeys(shift for shifts_of_contact in shifts for shift in shifts_of_contact))
     }
+    # Derivative of the centre of each contact by each displacement, three components each.
     by = np.zeros((len(shifts), 3 * len(every)))
     for row, shifts_of_contact in zip(by, shifts, strict=True):
         for shift, n in shifts_of_contact.items():
@@ -72,10 +74,10 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
 
 @remember
 def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array], ...], float]:
-    """What each contact is off by, in the order of `relations()`: by how much, (3,), of each displacement.
+    """For each contact, in the order of `relations()`, its derivative, (3,), by each displacement that it depends on.
 
-    A face comes nearer if its part moves along the normal; where a part is thought to be is off by how much it has
-    moved within its carrier since. The second number is the unit of displacements, the largest play, [m].
+    A contact closes when its part moves along the normal. The assumed pose of a carried part is off by its motion
+    within the carrier since. The second value is the unit of displacements, the largest play, [m].
     """
     relations = assembly.relations()
     shifts = []
@@ -84,6 +86,7 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
     for contact, made, _ in relations:
         own = dict[_Shift, Array]()
         if loose[contact]:
+            # The displacement is stated in the frame of the part that does not carry the other.
             inner, outer = contact if not _ever_carries(assembly, *contact) else contact[::-1]
             own[_Shift(inner.part, outer.part, made, made)] = -loose[contact] * assembly.face(inner).normal
         for face in contact:
@@ -95,18 +98,21 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
 
 
 def _ever_carries(assembly: Assembly, a: PartFace, b: PartFace) -> bool:
-    """Whether the part of a face ever carries that of another one, which is asked for in its frame then."""
+    """Whether an operation moves the part of face a and carries the part of face b."""
     return any(operation.main == a.part and b.part in operation.carries for operation in assembly.operations)
 
 
 def _looseness(assembly: Assembly, contact: Contact, play_m: float, unit_m: float) -> float:
-    """How far a contact may be off, in units of the largest play."""
+    """How far a contact may be off, in units of the largest play; for a sheet of a shaft in a hole, the disc counts."""
     size = assembly.play(contact, play_m) / unit_m if unit_m else 0.0
     return size * _DISC if contact in assembly.origin and not assembly.face(contact.manipulated).opposes else size
 
 
 def _carried_shifts(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[tuple[_Shift, float]]:
-    """The displacements within carriers by which a part is off after an operation: as it lay at first, and then."""
+    """The displacements within its carriers by which a part is off after an operation, with signs.
+
+    Each carrier adds the shift at which the part lay before (-1), and the one at the end of being carried (+1).
+    """
     carried = list[tuple[_Shift, float]]()
     for k in range(after, -1, -1):
         operation = assembly.operations[k]
@@ -121,8 +127,8 @@ def _carried_shifts(assembly: Assembly, part: str, after: int, loose: _Loose) ->
 
 
 def _together(assembly: Assembly, part: str, other: str, before: int, loose: _Loose) -> list[tuple[int, Array, float]]:
-    """The contacts that fit of a part with another one that stand before an operation: who made it, its normal, its
-    play in units.
+    """The fit contacts between two parts that stand before an operation: (made by, normal of the part, play in
+    units).
     """
     contacts = []
     for contact, made, lost in assembly.relations():

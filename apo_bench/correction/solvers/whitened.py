@@ -1,7 +1,7 @@
-"""Twists in units of the stated noise: z = L^-1 xi, with covariance L L^t, so that |z| is a Mahalanobis length.
+"""Pose corrections in units of the stated noise: z = L^-1 xi, with covariance L L^t; |z| is the Mahalanobis length.
 
-Where errors of operations are independent, L has a block for each, (n, 6, 6), and the six numbers of operation k are
-its own. Where they share errors, L is the factor of their joint covariance, (n, 6, 6 n): the six rows of each.
+If errors of operations are independent, L has a block for each, (n, 6, 6), and six components of z belong to each
+operation. If they share errors, L is the factor of their joint covariance, (n, 6, 6 n), six rows for each operation.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from apo_bench.geometry import Array, compute_right_jacobian, pose
 @final
 @dataclass(frozen=True, eq=False)
 class WhitenedPoses:
-    """The motion parameters of n operations as a vector z, (6 n,), that is zero at what was observed."""
+    """The poses of n operations as a vector z, (6 n,), which is zero at the observed poses."""
 
     observed: Array
     """(n, 4, 4), world frame, [m]."""
@@ -25,16 +25,16 @@ class WhitenedPoses:
     """(n, 6, 6) or (n, 6, 6 n), L, [m, rad]."""
 
     def poses(self, z: Array) -> Array:
-        """T_seen exp(L z), (n, 4, 4)."""
+        """T_observed exp(L z), (n, 4, 4)."""
         return np.asarray(self.observed @ pose.exp(unwhiten_twists(self.factor, z)))
 
     def pull_back(self, z: Array, J: Array) -> Array:
-        """A derivative by the body twists of the poses at z, (m, 6 n), as the derivative by z."""
+        """Convert a derivative by the body twists of the poses at z, (m, 6 n), to the derivative by z."""
         return pull_back(J, compute_right_jacobian(unwhiten_twists(self.factor, z)) @ self.factor)
 
 
 def whitened(observation: Observation) -> WhitenedPoses:
-    """The coordinates of an observation.
+    """The whitened coordinates of an observation.
 
     Raises:
         InputError: A covariance is not positive definite.
@@ -52,7 +52,7 @@ def unwhiten_twists(L: Array, z: Array) -> Array:
 
 
 def whiten_twists(L: Array, xi: Array) -> Array:
-    """z of body twists xi = L z, (*, n, 6) -> (*, 6 n)."""
+    """The z with L z = xi, (*, n, 6) -> (*, 6 n)."""
     flat = (*xi.shape[:-2], 6 * len(L))
     if L.shape[2] != 6:
         return np.asarray(np.linalg.solve(L.reshape(flat[-1], flat[-1]), xi.reshape(*flat, 1))[..., 0])
@@ -60,7 +60,7 @@ def whiten_twists(L: Array, xi: Array) -> Array:
 
 
 def pull_back(J: Array, B: Array) -> Array:
-    """A derivative by body twists, (m, 6 n), as one by z, (m, 6 n), of which B z are the body twists."""
+    """Convert a derivative by body twists, (m, 6 n), to one by z, (m, 6 n), if the body twists are B z."""
     m = len(J)
     n = len(B)
     if B.shape[2] != 6:
@@ -69,12 +69,13 @@ def pull_back(J: Array, B: Array) -> Array:
 
 
 def factor_noise(observation: Observation) -> Array:
-    """L of an observation, (n, 6, 6), or (n, 6, 6 n) where operations share errors.
+    """The factor L of the noise, (n, 6, 6), or (n, 6, 6 n) if operations share errors.
 
     Raises:
-        InputError: A covariance is not positive definite, or operations are said to share more than their errors.
+        InputError: A covariance is not positive definite, or shared errors are larger than the covariances that contain
+            them.
     """
-    # Errors that operations share couple them, so L is the factor of one matrix of all of them.
+    # Shared errors couple the operations, so L is then the factor of their joint covariance.
     if not observation.shared:
         return factor_covariance(observation.covariance)
     factor_covariance(observation.covariance)
@@ -91,7 +92,7 @@ def factor_noise(observation: Observation) -> Array:
 
 
 def whiten_poses(observed: Array, L: Array, poses: Array) -> Array:
-    """z of poses (*, n, 4, 4), the shortest that leads there from what was observed, (n, 4, 4): (*, 6 n)."""
+    """The shortest z that leads from the observed poses, (n, 4, 4), to these, (*, n, 4, 4): (*, 6 n)."""
     return whiten_twists(L, pose.log(pose.inverse(observed) @ poses))
 
 

@@ -1,7 +1,7 @@
-"""The relative pose in each contact equation, D_a^-1 D_b, and how it moves with the poses of the operations.
+"""Products of poses in the contact equations, D_a^-1 D_b, and their derivatives by the poses of operations.
 
-Such a product is a word, and the poses in it, start poses and operations' poses or their inverses, are its letters.
-Contacts between the same parts have the same word, which is multiplied out once.
+Such a product is a word; its letters are start poses and poses of operations, or their inverses. Contacts between the
+same parts have the same word, which is multiplied once.
 """
 
 from __future__ import annotations
@@ -16,34 +16,37 @@ from numpy.typing import NDArray
 from apo_bench.geometry import ADJOINTS, Array, remember
 
 _ONE = np.eye(4)
+"""The identity pose."""
 _HAT = np.ascontiguousarray(ADJOINTS[3:, :3, :3]).reshape(3, 9)
-"""The matrix of the cross product with t is sum_i t_i _HAT[i], rows of three."""
+"""The cross-product matrix of t is sum_i t_i _HAT[i], flattened to (9,)."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Words:
-    """g words of at most w letters, in the motion parameters of n operations and p constants, of c contacts."""
+    """The g different words of c contacts, of at most w letters, in the poses of n operations and p constants."""
 
     letters: NDArray[np.intp]
-    """(g, w): as in `Equations`: p constants, then n poses, then the identity as padding."""
+    """(g, w), as in `Equations`: indices of p constants, then n poses, then the identity as padding."""
     inverse: NDArray[np.bool_]
     """(g, w): which letters are inverted."""
     of: NDArray[np.intp]
     """(c,): the word of each contact."""
     p: int
+    """Number of constants, the start poses."""
     n: int
+    """Number of operations."""
 
     def __len__(self) -> int:
         return len(self.of)
 
     def among(self, contacts: NDArray[np.bool_]) -> Words:
-        """The words of these contacts, (c,), alone."""
+        """The words of the chosen contacts, (c,), alone."""
         return _among(self, contacts.tobytes())
 
     @cached_property
     def unknown(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """The words and places, (u,), of the letters that are poses of operations."""
+        """The word and the place in it, (u,) each, of every letter that is the pose of an operation."""
         word, place = np.nonzero((self.letters >= self.p) & (self.letters < self.p + self.n))
         return word, place
 
@@ -54,27 +57,28 @@ class Words:
 
     @cached_property
     def incidence(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Every pair of a contact and an unknown letter of its word, (i,)."""
+        """All pairs of a contact and an unknown letter of its word, as two index arrays, (i,) each."""
         contact, letter = np.nonzero(self.of[:, None] == self.unknown[0])
         return contact, letter
 
     @cached_property
     def once(self) -> bool:
-        """Whether no motion parameter occurs twice in a word."""
+        """Whether no operation occurs twice in a word."""
         return len(np.unique(self.unknown[0] * self.n + self.operation)) == len(self.operation)
 
     @cached_property
     def entries(self) -> NDArray[np.intp]:
-        """(u, 6, 6): where the block of each unknown letter stands in a matrix (g, 6, n, 6)."""
+        """(u, 6, 6): flat indices of the block of each unknown letter in an array (g, 6, n, 6)."""
         six = np.arange(6)
         first = (6 * self.unknown[0][:, None] + six) * self.n + self.operation[:, None]
         return 6 * first[:, :, None] + six
 
     def constants(self, start: Array) -> Array:
-        """All matrices and then their inverses, (2, p + n + 1, 4, 4), of the poses the last row alone.
+        """Matrices of all letters, and their inverses, (2, p + n + 1, 4, 4); of the operations only the last row is
+        filled in.
 
         Args:
-            start: (p, 4, 4): the constant motion parameters.
+            start: (p, 4, 4): the start poses.
         """
         stack = np.zeros((2, self.p + self.n + 1, 4, 4))
         stack[..., 3, 3] = 1.0
@@ -104,10 +108,11 @@ class Words:
         return self.prefixes(constants, T)[..., -1, :, :, :].take(self.of, axis=-3)
 
     def adjoints(self, prefixes: Array) -> Array:
-        """What the body twist of each unknown letter makes of the twist of its word, (*, u, 6, 6), in the frame of a.
+        """The derivative of the twist of its word by the body twist of each unknown letter, (*, u, 6, 6), in the frame
+        of a.
 
-        A pose T in F T .. turns by a body twist xi: F T exp(xi) = exp(Ad xi) F T .., with Ad that of F T; T^-1 turns by
-        -xi on its left, with Ad that of F.
+        For a pose T in F T .. with body twist xi: F T exp(xi) = exp(Ad xi) F T .., with Ad that of F T. T^-1 has -xi on
+        its left, with Ad that of F.
         """
         P = prefixes.reshape(*prefixes.shape[:-4], -1, 4, 4).take(self._sides, axis=-3)
         P[..., :3] *= self._signs
@@ -120,29 +125,30 @@ class Words:
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
-        """(w, g): where each letter stands among all matrices and then their inverses."""
+        """(w, g): index of each letter among all matrices followed by their inverses."""
         return np.ascontiguousarray((self.letters + self.inverse * (self.p + self.n + 1)).T)
 
     @cached_property
     def _sides(self) -> NDArray[np.intp]:
-        """(u,): where the product up to each unknown letter stands among the prefixes, (w + 1, g)."""
+        """(u,): index of the product up to each unknown letter among the prefixes, (w + 1, g)."""
         word, place = self.unknown
+        # + ~inverse: the product includes the letter itself unless that is inverted.
         return np.asarray((place + ~self.inverse[word, place]) * len(self.letters) + word)
 
     @cached_property
     def _signs(self) -> Array:
-        """(u, 1, 1): -1 of letters that are inverted."""
+        """(u, 1, 1): -1 for inverted letters, else 1."""
         return np.where(self.inverse[self.unknown], -1.0, 1.0)[:, None, None]
 
 
 @remember
 def _among(words: Words, contacts: bytes) -> Words:
-    """As of `Words.among`: relations are left out in turn of one assembly, again and again."""
+    """`Words.among`, cached, since the same relations are left out again and again."""
     return Words(words.letters, words.inverse, words.of[np.frombuffer(contacts, dtype=np.bool_)], words.p, words.n)
 
 
 def words_of(letters: NDArray[np.intp], inverse: NDArray[np.bool_], p: int, n: int) -> Words:
-    """The words of c contacts, (c, w), those that are the same put together."""
+    """Collect the different words of c contacts, whose letters are (c, w)."""
     c, w = letters.shape
     table = np.concatenate([letters, inverse], axis=1)
     different, of = np.unique(table, axis=0, return_inverse=True) if c else (table, np.zeros(0, dtype=np.intp))
@@ -150,7 +156,7 @@ def words_of(letters: NDArray[np.intp], inverse: NDArray[np.bool_], p: int, n: i
 
 
 def _invert(T: Array, out: Array) -> None:
-    """T^-1 = (R^t, -R^t t) of poses (*, 4, 4), but for the last row."""
+    """Write T^-1 = (R^t, -R^t t) of poses, (*, 4, 4), to `out`, except the last row."""
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     out[..., :3, :3] = Rt
     np.matmul(-Rt, T[..., :3, 3:], out=out[..., :3, 3:])

@@ -154,6 +154,7 @@ def arrive(
         there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
 
         def length(u: Array) -> float:
+            """Exit distance along `u`, [m]."""
             # Round walls may end farther out than the solids around the part require.
             ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
             return max(compute_exit_distance(moving, u, around), *ends)

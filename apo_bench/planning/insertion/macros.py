@@ -165,6 +165,7 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
             back[-1] = Macro("depart", d, (*last.makes, *macro.makes), macro.keeps, length)
         else:
             back.append(Macro("depart", d, macro.makes, macro.keeps, length))
+    # Only supports open in the last motion, so it is the lift of the transfer.
     if back and set(back[-1].makes) <= set(supports):
         back.pop()
     return tuple(back)

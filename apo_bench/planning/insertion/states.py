@@ -112,7 +112,7 @@ def _open_rows(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
         np.concatenate([np.zeros(n), -np.ones(k)]),
         A_ub=np.hstack([-N, np.eye(k)]),
         b_ub=np.zeros(k),
-        bounds=[(-_FASTEST, _FASTEST)] * n + [(0.0, 1.0)] * k,
+        bounds=[(-_FASTEST, _FASTEST)] * n + [(0.0, 1.0)] * k,  # of x, then of s
         method="highs",
     )
     opens = optimum.x[n:] > 0.5  # every s is 0 or 1
@@ -133,7 +133,7 @@ def evenly_open(rows: Array) -> Array:
         np.append(np.zeros(n), -1.0),
         A_ub=np.hstack([-rows, np.ones((k, 1))]),
         b_ub=np.zeros(k),
-        bounds=[(-1.0, 1.0)] * n + [(0.0, None)],
+        bounds=[(-1.0, 1.0)] * n + [(0.0, None)],  # of x, then of t
         method="highs",
     )
     x = optimum.x[:n] if optimum.x[n] > 1.0 / _FASTEST else np.zeros(n)
@@ -165,7 +165,7 @@ def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
     snapped = np.empty_like(normals)
     for i, n in enumerate(normals):
         near = [a for a in axes if np.linalg.norm(np.cross(a, n)) < np.sin(angle_rad)]
-        axis = max(near, key=lambda a: abs(a @ n), default=None)
+        axis = max(near, key=lambda a: abs(a @ n), default=None)  # the most parallel one
         if axis is None:
             axes.append(n)
         snapped[i] = n if axis is None else np.sign(axis @ n) * axis

@@ -112,6 +112,7 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
 def own_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
     """Normals, (3,) each, of the faces of a part that have contacts in operation k; a round face gives two."""
     faces = [assembly.face_of(of) for contact in assembly.operations[k].contacts for of in contact if of.part == part]
+    # frame[:3, :2]: two directions across the axis of a round face.
     return [n for face in faces for n in ([face.normal] if isinstance(face, Face) else face.frame[:3, :2].T)]
 
 
@@ -123,8 +124,9 @@ def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str
 def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
     """Height of the top of all resting parts (0 if lower), and of the bottom of the moved parts, [m]."""
     ends = {
+        # Lowest and highest z of the part in the world; row 2 of the rotation is the vertical in its frame.
         part: np.add(measure_extent(solid.pieces, poses[part][2, :3]), poses[part][2, 3]).tolist()
         for part, solid in assembly.solids.items()
     }
-    top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
+    top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)  # 0: height of the table
     return top, min(ends[part][0] for part in moved)

@@ -72,9 +72,10 @@ def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, 
     if how is None:
         return [none] * len(pairs)
     ways = goals[:, :3, :3] @ how.direction
-    level = np.abs(ways[:, 2]) < _LEVEL
+    level = np.abs(ways[:, 2]) < _LEVEL  # z component of the line, per alternative
     if not level.any():
         return [none] * len(pairs)
+    # Displacements of the moving part: back to the beginning of the line, then up.
     down = _ABOVE_M[:, None] * np.array([0.0, 0.0, 1.0]) - how.travel_m * ways[:, None]
     deepest = [_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
     return [np.where(level, each, none) for each in deepest]
@@ -93,7 +94,7 @@ def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array
         shifts: Displacements of `a`, (r, k, 3), world frame, [m].
     """
     T_a, T_b = (np.broadcast_to(T, (len(shifts), 4, 4)) for T in (T_a, T_b))
-    middle, radius = enclose_in_ball(a.pieces)
+    middle, radius = enclose_in_ball(a.pieces)  # bounding ball of a, in its frame
     places = (T_a[:, :3, :3] @ middle + T_a[:, :3, 3] - T_b[:, :3, 3])[:, None] + shifts
     seen_from_b = places @ T_b[:, :3, :3]
     # Only displacements that bring the bounding ball of a near the bounding box of b are measured exactly.

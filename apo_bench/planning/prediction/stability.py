@@ -64,7 +64,7 @@ def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float
     """
     assembly = known.assembly
     centroid = _centroid(assembly, operation, poses)
-    offs = _ASIDE * room_m if room_m else _ASIDE[:1]
+    offs = _ASIDE * room_m if room_m else _ASIDE[:1]  # row 0: no shift
     if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):
         return _of_normals(known, operation, poses, centroid + offs, ceilings)
     points, signs, ups = _forces(known, operation, poses)
@@ -87,8 +87,9 @@ def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, 
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
         return 0.0
     points, forces = with_friction(pushing)
+    # all forces, or without ceilings only those that do not push down
     carrying = forces[:, 2] > (-np.inf if ceilings else -_LEFT)
-    if not carrying.any():
+    if not carrying.any():  # nothing supports the part: the whole weight is unbalanced
         return 1.0
     points = points[carrying]
     forces = forces[carrying]
@@ -150,7 +151,7 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     """Points and forces, (k, 3) each: forces along normals, and four edges of the friction cone of each support."""
     every = list(pushing)
     points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))  # fields 0 and 1: points, forces
-    carrying = np.abs(n[:, 2]) >= _WALL
+    carrying = np.abs(n[:, 2]) >= _WALL  # near enough to the vertical to have friction
     held = points[carrying]
     m = n[carrying]
     # The cone of friction by four edges m + mu t: t level, across the normal, and across both.

@@ -1,4 +1,4 @@
-"""Generated assemblies: a seed draws parts, contacts, order and grasps."""
+"""Generated scenarios: a seed draws the parts, contacts, order and grasps of an assembly."""
 
 from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.scenario.generated.names import (

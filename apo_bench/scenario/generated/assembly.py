@@ -1,4 +1,4 @@
-"""A generated assembly: operations, and the stations of a board.
+"""The data of a generated assembly: a board with stations, and the operations that assemble them.
 
 Lengths in mm, in the frame of the assembly: x along the board, z up from the table.
 """
@@ -12,63 +12,70 @@ import numpy as np
 from apo_bench.scenario.parts.making import Body, Bore
 
 BOARD = "board"
-"""What everything stands on: one part, bolted to the table where the site is."""
+"""Name of the part on which everything stands, fixed to the table at the site."""
 Point = tuple[float, float, float]
 
 
 class DrawnOperation(NamedTuple):
-    """One operation."""
+    """One generated operation."""
 
     part: str
+    """The main part."""
     at: Point
-    """Where the frame of the part is in the end."""
+    """Target position of the frame of the part."""
     contacts: tuple[tuple[str, str], ...]
-    """A face of the part, or `other.face` of what it carries, and the face that it meets."""
+    """Pairs of a face of the part, or `other.face` of a part that it carries, and the face that it touches."""
     grasp: Point
     """Centre between the fingertips, frame of the part."""
     across: str = "y"
+    """Axis of the part along which the fingers close."""
     carries: tuple[str, ...] = ()
     vary_mm: tuple[tuple[str, float], ...] = ()
-    """How far its truth varies, either way, along axes of the part that no contact fixes."""
+    """Axis of the part that no contact fixes, and largest shift of the true pose along it, in either direction."""
 
 
 class Station(NamedTuple):
-    """A place on the board, about x = 0: what the board has there, and what is put together there, in order."""
+    """A place on the board, about x = 0, with its features of the board, its parts and its operations."""
 
     length: float
-    """Room that it takes along the board."""
+    """Length along the board."""
     parts: Mapping[str, Body]
+    """Its parts without the board."""
     acts: tuple[DrawnOperation, ...]
+    """Its operations, in order."""
     bores: tuple[Bore, ...] = ()
-    """Through the board."""
+    """Bores through the board."""
     bodies: tuple[Body, ...] = ()
-    """On the board: walls, rails, posts."""
+    """Walls, rails and posts on the board."""
     fixed: Mapping[str, Point] = {}
-    """Parts that stand next to the board and are bolted down, too."""
+    """Fixed parts next to the board -> position."""
 
 
 class GeneratedAssembly(NamedTuple):
-    """A whole assembly."""
+    """A complete assembly."""
 
     title: str
     parts: Mapping[str, Body]
-    """The board first."""
+    """All parts, the board first."""
     fixed: Mapping[str, Point]
-    """Where fixed parts stand."""
+    """Fixed part -> position."""
     acts: tuple[DrawnOperation, ...]
+    """All operations, in order."""
 
 
 def draw_length(rng: np.random.Generator, low: float, high: float) -> float:
-    """A length out of an interval, in steps of half a millimetre."""
+    """Draw a length from an interval, in steps of half a millimetre."""
     return float(rng.integers(round(2 * low), round(2 * high) + 1)) / 2
 
 
 def split(rng: np.random.Generator, total: int, least: Sequence[int], most: Sequence[int]) -> list[int]:
-    """Whole numbers of this sum between bounds; as near as can be where none are.
+    """Draw whole numbers between bounds with a given sum.
+
+    If the upper bounds do not allow the sum, their sum is reached.
 
     Args:
-        least: Of each number.
-        most: Of each number.
+        least: Lower bound of each number.
+        most: Upper bound of each number.
     """
     counts = list(least)
     while sum(counts) < total:
@@ -80,7 +87,7 @@ def split(rng: np.random.Generator, total: int, least: Sequence[int], most: Sequ
 
 
 def shift_station(station: Station, x: float) -> Station:
-    """A station at another place along the board."""
+    """The station shifted by x along the board."""
     return station._replace(
         acts=tuple(act._replace(at=(act.at[0] + x, *act.at[1:])) for act in station.acts),
         bores=tuple(replace(bore, at=(bore.at[0] + x, bore.at[1])) for bore in station.bores),
@@ -90,7 +97,7 @@ def shift_station(station: Station, x: float) -> Station:
 
 
 def merge_orders(rng: np.random.Generator, orders: Sequence[Sequence[DrawnOperation]]) -> tuple[DrawnOperation, ...]:
-    """Operations of several stations, one after another at random, those of each in their own order."""
+    """Interleave the operations of several stations at random; those of each station keep their order."""
     turns = rng.permutation([i for i, order in enumerate(orders) for _ in order])
     left = [iter(order) for order in orders]
     return tuple(next(left[i]) for i in turns)

@@ -1,6 +1,6 @@
-"""Bodies of generated parts, lengths in mm.
+"""Bodies of generated parts: blocks, pins, axles, rings, walls and rods; lengths in mm.
 
-Holes and slots are marked fit and get wider by the clearance. What goes into them stays as it is drawn.
+Holes and slots are marked fit and get wider by the clearance. Parts that go into them keep their size.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,9 @@ from apo_bench.scenario.parts.making import (
 )
 
 _SIDES = ("ny", "px", "py", "nx")
+"""Names of the sides of a block, in the order of `make_rectangle`: -y, +x, +y, -x."""
 _CHAMFER = 1.0
+"""Length of a chamfer."""
 COLLAR = 5.0
 """Thickness of the collar of an axle."""
 TOP = 20.0
@@ -39,40 +41,49 @@ class Pin(NamedTuple):
 
 
 PIN = Pin(0.0, 0.0, 4.5, "pin")
-"""On top of a block, for what is put on it."""
+"""The pin on top of a block, for the part that is placed on it."""
 
 
 def box(
     at: tuple[float, float, float], size: tuple[float, float, float], fit: Sequence[str] = (), **names: str
 ) -> Body:
-    """A box about the middle of its bottom; its sides may be named, as `nx="wall"`."""
+    """A box of a given size.
+
+    Args:
+        at: Centre of its bottom.
+        fit: Names of the sides that recede by the clearance.
+        names: Side -> name, as `nx="wall"`.
+    """
     outline = make_rectangle(*size[:2], at[:2], names=[names.get(side, "") for side in _SIDES], fit=fit)
     return extrude(outline, at[2], at[2] + size[2])
 
 
 def hole(pin: Pin, high: float) -> Bore:
-    """The hole for a pin, from 0 to a height."""
+    """The hole for a pin, from height 0 to `high`."""
     return bore((pin.x, pin.y), pin.radius, 0.0, high, pin.name, fit=True)
 
 
 def block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:
-    """A block about z on its bottom: faces `ny`, `px`, `py`, `nx`, `bottom`, `top`, and those of its pins and holes."""
+    """A block on z = 0, centred about the z axis.
+
+    Its faces are `ny`, `px`, `py`, `nx`, `bottom`, `top`, and those of its pins and through holes.
+    """
     bores = [hole(each, height) for each in holes]
     base = extrude(make_rectangle(width, depth, names=_SIDES), 0, height, bores=bores, bottom="bottom", top="top")
     return join(base, *(upright(pin, height) for pin in pins)) if pins else base
 
 
 def upright(pin: Pin, low: float) -> Body:
-    """A pin that stands on a height."""
+    """A pin with a chamfered tip whose lower end is at height `low`."""
     return make_shaft(pin.radius, low, low + pin.length, pin.name, chamfer_high=1.5).moved((pin.x, pin.y, 0.0))
 
 
 def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
-    """A shaft whose collar stops it: `side` below the `shoulder`, `neck` above the `ledge`.
+    """A shaft with a collar: `side` below its `shoulder`, `neck` above its `ledge`.
 
     Args:
         deep: Length below the collar.
-        collar: Its radius.
+        collar: Radius of the collar.
         neck: Length above the collar.
     """
     ledge = deep + COLLAR
@@ -121,17 +132,23 @@ def saddle(length: float, depth: float, height: float, slot: float, roof: float)
 
 
 def upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin) -> Body:
-    """A wall across x, about x = 0, between two heights, with a hole along x; `hole` has (height, y) as its place."""
-    # lying along z it is turned up: what was -x becomes z, what was z becomes x
+    """A wall across x, about x = 0, between two heights, with a hole along x.
+
+    Args:
+        thick: Thickness along x.
+        depth: Width along y.
+        hole: Its x is the height of the hole, its y the position along y.
+    """
+    # Made lying, then turned up about y: -x becomes z, and z becomes x.
     bored = bore((-hole.x, hole.y), hole.radius, -thick / 2, thick / 2, hole.name, fit=True)
     lying = extrude(make_rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
     return lying.moved(turn_deg=(0, 90, 0))
 
 
 def rod(radius: float, length: float, grip: float) -> Body:
-    """A shaft along x, from 0 on, its axis a radius high, with a square head before it that keeps it from rolling."""
+    """A shaft along x from x = 0, lying on z = 0, with a square head of length `grip` that keeps it from rolling."""
     square = extrude(make_rectangle(2 * radius, 2 * radius), -grip, 0, bottom="end")
-    # a groove behind the head, as a shaft as wide as the square would leave slivers of its face
+    # A groove behind the head, since a shaft as wide as the square would leave slivers of its face.
     steps = [
         Frustum(0, 2, radius - _CHAMFER),
         Frustum(2, length - _CHAMFER, radius, name="side"),
@@ -141,5 +158,5 @@ def rod(radius: float, length: float, grip: float) -> Body:
 
 
 def along_x(section: Sequence[Edge], length: float) -> Body:
-    """A prism over an outline (y, z), along x about its middle."""
+    """A prism along x, centred at x = 0, with an outline in (y, z)."""
     return extrude(section, -length / 2, length / 2).moved(turn_deg=(90, 0, 90))

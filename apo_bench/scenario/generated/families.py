@@ -1,4 +1,4 @@
-"""Families of generated assemblies."""
+"""Families of generated assemblies: the stations that each combines, its sizes and its probability."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -19,34 +19,37 @@ from apo_bench.scenario.generated.stations import make_carried, make_corner, mak
 from apo_bench.scenario.parts.making import Body, extrude, join, make_rectangle
 
 _GAP = 10.0
+"""Distance between stations, [mm]."""
 _EDGE = 6.0
+"""Margin of the board around stations, [mm]."""
 _LONGEST = 226.0
-"""Of a board, which the arm reaches all over."""
+"""Largest length of a board, all of which the arm can reach, [mm]."""
 
 
 class Kind(NamedTuple):
     """One kind of station."""
 
     make: Callable[[np.random.Generator, str, int], Station]
-    """The station of a number, with so many parts."""
+    """(rng, number of the station as text for names, number of parts) -> station."""
     least: int
-    """Parts of it."""
+    """Least number of parts."""
     most: int
+    """Largest number of parts."""
 
 
 class Family(NamedTuple):
-    """Assemblies of one kind."""
+    """A family of assemblies."""
 
     title: str
     kinds: tuple[str, ...]
-    """What may stand on the board."""
+    """Kinds of stations that may stand on the board."""
     sizes: tuple[int, int]
-    """Least and most parts, the board among them."""
+    """Least and largest number of parts, the board included."""
     weight: int
-    """How often a seed without a family draws it, of the sum of all; 0: it is held out for tests."""
+    """Relative probability that a seed without a family draws it; 0: held out for tests."""
 
     def draw(self, rng: np.random.Generator) -> GeneratedAssembly:
-        """One assembly of the family."""
+        """Draw one assembly of the family; drawing is repeated until the board is short enough."""
         stations = list[Station]()
         while not stations or _length(stations) > _LONGEST:
             size = int(rng.integers(self.sizes[0], self.sizes[1] + 1)) - 1
@@ -61,12 +64,12 @@ class Family(NamedTuple):
 
 
 def _length(stations: Sequence[Station]) -> float:
-    """Of the board that stations need."""
+    """Length of the board that the stations need, [mm]."""
     return sum(station.length for station in stations) + _GAP * (len(stations) - 1) + 2 * _EDGE
 
 
 def place_stations(title: str, stations: Sequence[Station], rng: np.random.Generator) -> GeneratedAssembly:
-    """Stations next to each other on one board."""
+    """Place stations next to each other on one board, and interleave their operations."""
     length = _length(stations)
     placed = list[Station]()
     x = _EDGE - length / 2
@@ -87,7 +90,7 @@ def place_stations(title: str, stations: Sequence[Station], rng: np.random.Gener
 
 
 _MOST = 4
-"""Stations on a board."""
+"""Largest number of stations on a board."""
 _KINDS: Mapping[str, Kind] = {
     "corner": Kind(make_corner, 1, 3),
     "peg": Kind(make_peg, 1, 2),
@@ -117,4 +120,4 @@ FAMILIES: Mapping[str, Family] = {
     "castles": Family("Loose blocks that a stick in their slots joins", ("castled",), (4, 8), 0),
     "rods": Family("Loose brackets that a level rod joins", ("threaded",), (3, 4), 0),
 }
-"""Those with weight 0 are held out: no `generated:SEED` is one of them, nor has a kind of station of theirs."""
+"""All families by name. Those with weight 0 are held out: no `generated:SEED` draws them or their kinds of stations."""

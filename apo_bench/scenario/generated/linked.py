@@ -1,4 +1,7 @@
-"""Stations whose parts lie loosely until a later part links them; lengths in mm."""
+"""Stations whose parts lie loose until a later part links them; lengths in mm.
+
+Each function takes the generator, the number of the station as text for names, and the number of parts.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -24,11 +27,11 @@ from apo_bench.scenario.generated.stations import LETTERS, LOW, WALL, head, hold
 from apo_bench.scenario.parts.making import Body, bore, extrude, join, make_polygon, make_rectangle
 
 _FOOT = 32.0
-"""How far the foot of a bracket reaches from its wall."""
+"""Length of the foot of a bracket from its wall."""
 
 
 def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Plates that lie anywhere on each other until two axles go through all of them."""
+    """Loose plates on each other, then two axles through all of them."""
     radius = draw_length(rng, 5, 6)
     apart = draw_length(rng, 17, 20)
     width = 2 * apart + 2 * radius + 16
@@ -50,7 +53,7 @@ def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
 
 
 def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Two or three towers that stand anywhere, plates over the pins of each two, blocks on these plates."""
+    """Two or three loose towers, plates that join the pins of neighbouring towers, and blocks on these plates."""
     count = 3 if size >= 5 and (size > 6 or rng.random() < 0.7) else 2
     pitch = draw_length(rng, 66, 72)
     width = draw_length(rng, 40, 44)
@@ -84,28 +87,29 @@ def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
 
 
 class SlidingPair(NamedTuple):
-    """What keys go into, along x about the middle of a board, and a key."""
+    """A sliding joint along x: the rails on a board, and a key that slides between them."""
 
     rails: tuple[Body, ...]
-    """On the board."""
+    """Bodies on the board."""
     key: Body
     height: float
-    """Of the key."""
+    """Height of the key."""
     meets: tuple[tuple[str, str], ...]
-    """Faces of the key, and those of the rails."""
+    """Pairs of a face of the key and the face of a rail that it touches."""
 
 
 def make_keyed(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Two keys that may be anywhere along a slot, a bar over the pins of both, blocks on the bar."""
+    """Two keys at any place along a slot, a bar over the pins of both, and blocks on the bar."""
     return _barred(rng, i, size, _slot)
 
 
 def make_grooved(rng: np.random.Generator, i: str, size: int) -> Station:
-    """The same with keys whose tilted faces lie in a groove."""
+    """As `make_keyed`, with keys whose tilted faces lie in a groove."""
     return _barred(rng, i, size, _groove)
 
 
 def _slot(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
+    """Two upright rails of a given length, and a block as key."""
     width = draw_length(rng, 18, 24)
     height = draw_length(rng, 34, 40)
     low = draw_length(rng, 10, 12)
@@ -117,7 +121,7 @@ def _slot(rng: np.random.Generator, length: float, key_length: float) -> Sliding
 
 
 def _groove(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
-    """Rails that lean outwards by an angle, and a key with such flanks."""
+    """Two rails with faces that lean outwards by a drawn angle, and a key with the same flanks."""
     slope = float(np.tan(np.radians(rng.integers(45, 66))))
     low = draw_length(rng, 11, 13)
     floor = draw_length(rng, 7, 9)
@@ -142,7 +146,11 @@ def _groove(rng: np.random.Generator, length: float, key_length: float) -> Slidi
 def _barred(
     rng: np.random.Generator, i: str, size: int, way_of: Callable[[np.random.Generator, float, float], SlidingPair]
 ) -> Station:
-    """Two keys in one way, and a bar along it."""
+    """Two keys between the same rails, a bar over both, and blocks on the bar.
+
+    Args:
+        way_of: (rng, length of the rails, length of a key) -> rails and key.
+    """
     apart = draw_length(rng, 25, 28)
     length = draw_length(rng, 28, 34)
     way = way_of(rng, 2 * apart + length + 6, length)
@@ -163,7 +171,7 @@ def _barred(
 
 
 def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Two or three blocks with slots that stand anywhere, a stick laid into all of them, saddles over the stick."""
+    """Two or three loose blocks with slots, a stick laid into all slots, and saddles over the stick."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(3, size - 1) + 1))
     pitch = draw_length(rng, 70, 74)
     length = draw_length(rng, 34, 38)
@@ -201,7 +209,7 @@ def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
 
 
 def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Brackets that stand anywhere, and a rod that is pushed, level, through the wall of the board and all of them."""
+    """Loose brackets, and a horizontal rod that is pushed through the wall of the board and all brackets."""
     count = size - 1
     radius = draw_length(rng, 7, 8)
     high = draw_length(rng, 38, 42)

@@ -1,4 +1,4 @@
-"""Names of generated assemblies: `generated:SEED` and `generated:FAMILY:SEED`."""
+"""Generate and write an assembly from its name: `generated:SEED` or `generated:FAMILY:SEED`."""
 
 import re
 import tempfile
@@ -15,20 +15,22 @@ from apo_bench.scenario.generated.writing import write
 
 _PREFIX = "generated:"
 _FAMILY_STREAM = 40
+"""Added to a seed for the generator that draws the family."""
 _ASSEMBLY_STREAM = 41
+"""Added to a seed for the generator that draws the assembly."""
 _NAME = re.compile(r"generated:(?:([a-z-]+):)?(\d{1,15})")
 
 
 def is_generated(name: object) -> bool:
-    """Return whether a name is meant as that of a generated assembly."""
+    """Return True if a name begins with `generated:`."""
     return isinstance(name, str) and name.startswith(_PREFIX)
 
 
 def complete_name(name: str) -> str:
-    """Return the name with its family: of `generated:SEED` that which the seed draws.
+    """Return the name with its family; for `generated:SEED` the seed draws the family.
 
     Raises:
-        InputError: No such family, or no such seed.
+        InputError: The family is unknown, or the name has another form.
     """
     match = _NAME.fullmatch(name)
     if match is None:
@@ -46,16 +48,17 @@ def complete_name(name: str) -> str:
 
 
 def make_generated_file(name: str) -> Path:
-    """Return the scenario file of a generated assembly, in a folder that lasts as long as this process.
+    """Return the path of the scenario file of a generated assembly, in a folder that is deleted with this process.
 
     Raises:
-        InputError: No such family, or no such seed.
+        InputError: The family is unknown, or the name has another form.
     """
     return _write_once(complete_name(name))
 
 
 @lru_cache(maxsize=1024)
 def _write_once(name: str) -> Path:
+    """Write the files of a complete name at the first call, and return the path of the scenario file."""
     folder = Path(_folder().name) / name.replace(":", "_")
     folder.mkdir()
     return write_generated(name, folder)
@@ -63,23 +66,24 @@ def _write_once(name: str) -> Path:
 
 @lru_cache(maxsize=1)
 def _folder() -> tempfile.TemporaryDirectory[str]:
+    """The temporary folder of this process."""
     return tempfile.TemporaryDirectory(prefix="apo_bench_")
 
 
 def write_generated(name: str, folder: Path) -> Path:
-    """Write the files of a generated assembly, and return that of the scenario."""
+    """Write the files of a generated assembly, and return the path of the scenario file."""
     assembly, rng = generate_assembly(name)
     return write(assembly, lay(assembly, rng), folder, "_".join(complete_name(name).split(":")[1:]))
 
 
 def generate_assembly(name: str) -> tuple[GeneratedAssembly, np.random.Generator]:
-    """Generate an assembly without a table.
+    """Generate an assembly without the layout of its table.
 
     Returns:
-        The assembly, and the generator that draws its table next.
+        The assembly, and the generator in the state from which it draws the layout.
 
     Raises:
-        InputError: No such family, or no such seed.
+        InputError: The family is unknown, or the name has another form.
     """
     _, family, seed = complete_name(name).split(":")
     rng = np.random.default_rng([int(seed), _ASSEMBLY_STREAM, *family.encode()])

@@ -1,6 +1,7 @@
-"""Stations whose parts each go onto a fixed one, or onto the part before.
+"""Stations whose parts are each placed on a fixed part or on the part before; lengths in mm.
 
-Sizes are such that fingers, 12 mm thick and 10 mm below their tips, pass next to other parts. Lengths in mm.
+Sizes are such that fingers, 12 mm thick and 10 mm below their tips, pass next to other parts. The station functions
+take the generator, the number of the station as text for names, and the number of parts.
 """
 
 from collections.abc import Sequence
@@ -12,25 +13,27 @@ from apo_bench.scenario.generated.bodies import COLLAR, PIN, TOP, Pin, axle, blo
 from apo_bench.scenario.parts.making import Body, bore
 
 LETTERS = "abcdefghijkl"
+"""Suffixes of the names of parts."""
 LOW = 4.0
-"""A shaft in a board ends so high over the table."""
+"""Height of the lower end of a shaft in a board above the table."""
 WALL = 6.0
+"""Thickness of a wall."""
 _LOOSE = 0.5
-"""How often a block lies on another one anywhere, in place of on its pin."""
+"""Probability that the top block lies loose on the one below, without a pin."""
 
 
 def hold(height: float) -> Point:
-    """Fingers next to a block of this height: well above its bottom, and never below it."""
+    """The grasp point of a block of this height, so that the fingers stay above its bottom."""
     return (0.0, 0.0, height - 2.0 if height < 22.0 else height - 10.0)
 
 
 def head(deep: float, neck: float) -> Point:
-    """Fingers about the end of the neck of an axle."""
+    """The grasp point of an axle, at the end of its neck; arguments as in `axle`."""
     return (0.0, 0.0, deep + COLLAR + neck - 10.0)
 
 
 def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
-    """A block in a corner of two walls, others on top of it."""
+    """A block in the corner of two walls, and a pile of blocks on top of it."""
     width = draw_length(rng, 32, 40)
     depth = draw_length(rng, 28, 34)
     height = draw_length(rng, 38, 44)
@@ -51,11 +54,13 @@ def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
 def make_pile(
     rng: np.random.Generator, below: str, at: Point, count: int, loose: bool = False
 ) -> tuple[dict[str, Body], list[DrawnOperation]]:
-    """Blocks on each other, each on the pin of the one below it.
+    """A pile of blocks, each on the pin of the one below; returns its parts and operations.
 
     Args:
-        below: What they begin on; it has a pin in the middle of its top, which is at `at`, if one goes onto it.
-        loose: The last one has no pin below it, and lies anywhere.
+        below: Name of the part under the pile, which has a pin if the first block needs one.
+        at: Centre of the top of that part.
+        count: Number of blocks.
+        loose: The last block has no pin below it and lies at any place.
     """
     parts = dict[str, Body]()
     acts = list[DrawnOperation]()
@@ -78,7 +83,7 @@ def make_pile(
 
 
 def make_peg(rng: np.random.Generator, i: str, size: int) -> Station:
-    """An axle in a bore of the board, and a ring over it."""
+    """An axle in a bore of the board, and, if there are two parts, a ring over it."""
     radius = draw_length(rng, 5, 7)
     parts, acts = make_ringed_axle(rng, i, radius)
     bores = (bore((0, 0), radius, 0, TOP, f"bore{i}", fit=True),)
@@ -88,7 +93,11 @@ def make_peg(rng: np.random.Generator, i: str, size: int) -> Station:
 def make_ringed_axle(
     rng: np.random.Generator, i: str, radius: float
 ) -> tuple[dict[str, Body], tuple[DrawnOperation, ...]]:
-    """An axle that its collar stops on the board, and a ring on its neck."""
+    """An axle whose collar rests on the board, and a ring on its neck; returns parts and operations.
+
+    Args:
+        radius: Radius of the axle.
+    """
     collar = radius + draw_length(rng, 4, 6)
     deep = TOP - LOW
     height = draw_length(rng, 14, 18)
@@ -131,7 +140,14 @@ def make_plates(
     heights: Sequence[float],
     through: Sequence[Pin],
 ) -> tuple[dict[str, Body], list[DrawnOperation]]:
-    """Plates flat on each other, with bores for what goes through them."""
+    """Plates on each other, with bores for the pins that go through them; returns parts and operations.
+
+    Args:
+        width: Length of a plate along x.
+        depth: Least and largest width of a plate along y.
+        heights: Thickness of each plate.
+        through: The pins; the last letter of a name is that of the bore.
+    """
     holes = [pin._replace(name=f"bore{pin.name[-1]}") for pin in through]
     parts = dict[str, Body]()
     acts = list[DrawnOperation]()
@@ -147,7 +163,7 @@ def make_plates(
 
 
 def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
-    """Two to four axles in bores of the board, a cover over all of them, rings on the cover."""
+    """Two to four axles in bores of the board, a cover over all of them, and rings on the cover."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(4, size - 1) + 1))
     ringed = {int(k) for k in rng.permutation(count)[: size - 1 - count]}
     radius = draw_length(rng, 5, 6)
@@ -182,7 +198,7 @@ def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
 
 
 def make_carried(rng: np.random.Generator, i: str, size: int) -> Station:
-    """An axle that gets its ring in a stand next to the board, and then carries it to its bore; three parts."""
+    """An axle that gets its ring in a stand next to the board and then carries it to its bore; three parts."""
     radius = draw_length(rng, 5, 7)
     parts, (first, second) = make_ringed_axle(rng, i, radius)
     stand = f"stand{i}"

@@ -12,10 +12,13 @@ from apo_bench.scenario.generated.laying import TableLayout
 from apo_bench.scenario.parts.making import Body, write_part
 
 _DENSITY = 700.0
+"""[kg/m^3]."""
 _FRICTION = (0.8, 0.005, 0.0001)
+"""Sliding, torsional, rolling."""
 _SOURCE = "apo_bench.scenario.generated"
 _LICENCE = "CC0-1.0"
 _GREY = (0.45, 0.47, 0.50)
+"""Colour of fixed parts."""
 _COLORS = (
     (0.80, 0.36, 0.27),
     (0.27, 0.53, 0.78),
@@ -28,7 +31,7 @@ _COLORS = (
 
 
 def write(made: GeneratedAssembly, table: TableLayout, folder: Path, name: str) -> Path:
-    """Write the files of an assembly; returns that of the scenario."""
+    """Write the part files and the scenario file of an assembly; return the path of the scenario file."""
     files = _stems(made.parts)
     for part, stem in files.items():
         if part == stem:
@@ -41,12 +44,13 @@ def write(made: GeneratedAssembly, table: TableLayout, folder: Path, name: str) 
 
 
 def _stems(parts: Mapping[str, Body]) -> Mapping[str, str]:
-    """Part -> the first part that is the same body."""
+    """Part -> name of its part file, which is the first part with the same body."""
     first: dict[int, str] = {}
     return {name: first.setdefault(id(body), name) for name, body in parts.items()}
 
 
 def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, str]) -> dict[str, Any]:
+    """The content of the scenario file; `files` is the result of `_stems`."""
     parts: dict[str, Any] = {"table": {"file": "table", "fixed": True}}
     for k, part in enumerate(made.parts):
         is_fixed = part in made.fixed
@@ -74,6 +78,7 @@ def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, s
 
 
 def _operation(act: DrawnOperation) -> dict[str, Any]:
+    """The entry of `[[operations]]`."""
     return {
         "move": act.part,
         "carries": act.carries,
@@ -85,5 +90,5 @@ def _operation(act: DrawnOperation) -> dict[str, Any]:
 
 
 def _round_lengths(values: Iterable[float]) -> list[float]:
-    """Return lengths of at most six digits, none below a ten-thousandth of a millimetre."""
+    """Return lengths rounded to 0.0001 mm and to six digits."""
     return [float(f"{float(np.round(value, 4)) + 0.0:g}") for value in values]

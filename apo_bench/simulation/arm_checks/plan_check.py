@@ -61,9 +61,9 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     code, path, ended = solve_key_angles(t, scene)
     if code:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
-    if scene.arm.hand is None:
+    if scene.arm.hand is None:  # without a gripper file only reach is predicted
         return ArmMove(step.operation, step.undo)
-    T_tip = scene.kinematics.forward(path[-1])
+    T_tip = scene.kinematics.forward(path[-1])  # at the goal
     depth, struck = struck_by(scene, t, estimated, after)
     return ArmMove(
         operation=step.operation,

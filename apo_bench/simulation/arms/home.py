@@ -72,10 +72,10 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
     kinematics = Kinematics(arm, posture=False)
     rng = np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.joint_range)
-    homes: list[tuple[Array, float]] = []
+    homes: list[tuple[Array, float]] = []  # joint angles, yaw
     for i in range(tries):
         start = rng.uniform(low, high)
-        near = _NEAR * (i > 0)
+        near = _NEAR * (i > 0)  # 0 for the first try
         # Even tries start near the middle of the ranges (the first exactly there), odd ones anywhere.
         start = start if i % 2 else (low + high) / 2 + near * (start - (low + high) / 2)
         way = _WAYS[i // 2 % len(_WAYS)]
@@ -96,6 +96,7 @@ def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, fl
     reached, least = room(kinematics, q, way)
     kinematics.forward(q)
     moved = kinematics.model.body_jntnum > 0
+    # rounded so that nearly equal margins compare by height
     return reached, round(min(least, _ENOUGH_RAD), 2), float(kinematics.configuration.data.xpos[moved, 2].mean())
 
 

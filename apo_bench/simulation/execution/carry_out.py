@@ -98,6 +98,7 @@ def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
         ExecutionAborted: Something went wrong; stage and code name it.
     """
     grip, second = carry_to_attach(robot, t, i, lay)
+    # A slide sets its own name; the other macros are one motion.
     robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
     left, grip = _attach(robot, t, grip, second)
     _leave_there(robot, t, grip, left)
@@ -158,7 +159,7 @@ def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_
 
 def find_attach_end(t: Transfer, grip: Grip, second: Grip | None) -> Array:
     """Return the tip pose at which the guarded motion ends, (4, 4); if the grip changes, the motion up to there."""
-    goal = first_contact_pose(t)
+    goal = first_contact_pose(t)  # of the part
     if second is not None and t.into.left is not None:
         goal = translate(t.T_world_goal, t.into.direction, -t.into.left)
     return translate(goal, UP, t.floats if t.into.level else 0.0) @ grip.T_part_tip
@@ -278,6 +279,7 @@ def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_sear
     Returns:
         The second grip, and the height of the part above the floor, [m].
     """
+    # Pose of the part at the change of grip, still raised; the grasp itself is at the height of the floor.
     there = translate(translate(t.T_world_goal, t.into.direction, -(t.into.left or 0.0)), UP, t.floats)
     change_grip(robot, t, grip, second, after_search(T_search, translate(there, UP, -t.floats) @ second.T_part_tip))
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.clearance), 0.01))
@@ -298,6 +300,7 @@ def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array
     goal = after_search(T_search, translate(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if not any(macro.name == "move-to-bottom" for macro in t.macros):
         return press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)[0]
+    # Up to just before the bottom, then slowly until contact.
     line = _into(robot, t, translate(goal, t.into.direction, -_BOTTOM_M), _BOTTOM_M)
     left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
     if left == 0.0:
@@ -310,6 +313,7 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     """Lower the part from above until it stands, slowly where contact may come."""
     down = Guard(t.into.direction, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
+    # Down to the slow stretch, then on until contact.
     above = plan_steady_trajectory(robot.T, translate(goal, t.into.direction, -t.slow), _PLACE)
     left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:

@@ -35,6 +35,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     level = move_to_height(above, robot.T[2, 3])
     # A short arm cannot reach over the grasp at the present height; then it comes down to the least height on its way.
     between = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
+    # `follow_waypoints` returns None out of reach.
     is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, between, robot.q) is None
     robot.go(move_to_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)  # from here on contact with this part is no collision

@@ -152,7 +152,7 @@ def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0]) if grasp.ahead is None else grasp.ahead
     across = grasp.across
     along = float(across @ ahead)
-    if abs(along) > _SQUARE:  # of a part that stands tilted
+    if abs(along) > _SQUARE:  # the part is tilted: make the closing direction perpendicular to the z axis
         across = across - along * ahead
         across = across / np.linalg.norm(across)
     return frame(np.column_stack([across, np.cross(ahead, across), ahead]), grasp.point)
@@ -176,7 +176,7 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
 
 
 def _known_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
-    """Return the half width stored with the grasp, else compute it; a hundred candidates would take seconds."""
+    """Return the half width stored with the grasp, computed only if it is missing, since that is slow."""
     return half_width(pieces, grasp, T) if grasp.half_width is None else grasp.half_width
 
 
@@ -231,6 +231,7 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     up = int(np.abs(T[2, :3]).argmax())
     # From the middle of the box up to the height of the tip, in the frame of the part.
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
+    # For each level axis across which the fingers close, the candidates are spread along the other one.
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     grasps = []
     for axis, along in (level, level[::-1]):
@@ -260,6 +261,7 @@ def find_clear_grasp(
     # Grasps that are not clear with the least margin are not clear with a larger one.
     left = [] if first is not None else list(_clear(kinematics, solid, grasps, places, less[-1], strokes))
     margins = less[:-1] if left else ()
+    # The widest margin, else the ones between, else the least.
     return next(
         (g for m in margins for g in _clear(kinematics, solid, left, places, m, strokes)),
         first or next(iter(left), None),

@@ -47,6 +47,7 @@ def press_in(
     end = line.end
     T_search = None
     aside = 0.0  # offset of the searches so far, [m]
+    # The part's foremost point in the frame of the tip.
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
     for _ in range(SEARCHES):
         if left <= near or aside >= RADIUS_M:
@@ -60,6 +61,7 @@ def press_in(
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.direction, guard.newton)
+        # Continue the insertion there, and include the lateral offset with which it ends.
         more = translate(more, _ease_in(robot, more @ end, guard), 1.0)
         T_search = more if T_search is None else more @ T_search
         end = more @ end

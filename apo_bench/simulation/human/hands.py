@@ -97,7 +97,7 @@ class Hands:
         """
         counts = [max(1, round(line.seconds / self._step_s)) for _, line in moves]
         n = max(counts)
-        hand, line = moves[counts.index(n)]
+        hand, line = moves[counts.index(n)]  # the longest motion
         done = 0
         if len(moves) > 1:
             # Simulate until the part in the other hand has come to rest.
@@ -146,9 +146,8 @@ class Hands:
             begin: Steps done before.
             data: The state to change.
         """
-        at = (
-            begin + steps + np.array([0.0, TINY_S / self._step_s])
-        )  # at the end and slightly later, for the velocity, in steps
+        # In steps: at the end and slightly later, for the velocity.
+        at = begin + steps + np.array([0.0, TINY_S / self._step_s])
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
         for part, T_hand_part in self._held[hand].items():
             # The pose of a hand without delay that would hold the part where it is.
@@ -177,6 +176,7 @@ class Hands:
 
     def _step(self, n: int) -> None:
         """Simulate n steps, and call the hook after every tick."""
+        # `left`: steps until the next tick.
         while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
             self._tick(self.data)

@@ -96,6 +96,7 @@ def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
         _adjust(hands, part, operation.true[part], _LIFT_M, ())
         hands.let_go(1, part)
     if standing:
+        # Meanwhile the main part goes the first 15 % of its stroke.
         _adjust(hands, standing[-1], operation.true[standing[-1]], _LIFT_M, ((0, _first(stroke, 0.15)),))
         hands.move((0, smooth_trajectory(_first(stroke, 0.15).end, stroke.end, _STROKE)))
     else:

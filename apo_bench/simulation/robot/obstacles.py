@@ -62,10 +62,11 @@ class MovingPieces(NamedTuple):
 
 
 def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[MovingPieces]:
-    """Return everything that moves with the tip: first the gripper at an opening of each finger, [m], then each held part.
+    """Return everything that moves with the tip: first the gripper, then each held part.
 
     Args:
         T_tip: Present pose of the tip, (4, 4), world.
+        opening: Of each finger, [m].
         held: The held parts, at their present poses in the simulation.
     """
     inverse = pose.inverse(T_tip)

@@ -83,6 +83,7 @@ class Robot:
         self.arm = scene.arm
         self.model = scene.work.model
         self.hooks = as_hooks(watch)
+        # The action in progress, for outcomes and hooks.
         self.stage = "plan"
         self.macro = ""
         self.step: Step | None = None
@@ -147,6 +148,7 @@ class Robot:
             return 0.0
         kinematics = self.scene.kinematics
         line, knots = limit_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        # Progress along the line after each of n physics steps.
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         done = 0

@@ -88,5 +88,5 @@ def widest_disc(piece: Piece) -> float:
         return piece.cylinder.radius
     # In a plane of normal m through the middle, the distance to a side of normal n is its distance / |n x m|.
     n = piece.planes[:, :3]
-    far = piece.planes[:, 3] - n @ piece.corners.mean(axis=0)
+    far = piece.planes[:, 3] - n @ piece.corners.mean(axis=0)  # distance of each side from the middle
     return float((far / np.sqrt(np.maximum(1.0 - (n @ n.T) ** 2, 1e-12))).min(axis=1).max())

@@ -21,7 +21,7 @@ _BESIDE_M = 0.002
 def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
     """Raise an `InputError` if a part is too wide for the open gripper, too heavy or too smooth.
 
-    The span of boxes between the pads is not required to be found: they are held across their whole width.
+    A grasp with nothing between the pads is an error, too, unless the part is of boxes alone: then the replay loses it.
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
         solid = scenario.assembly.solids[operation.main]

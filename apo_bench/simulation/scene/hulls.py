@@ -20,7 +20,7 @@ def clip_hull(hull: Hull, cut: Array) -> Hull:
     high = hull.corners[height > 0.0]
     a = height[height <= 0.0]
     b = height[height > 0.0]
-    part = a[:, None] / (a[:, None] - b)
+    part = a[:, None] / (a[:, None] - b)  # share of the line from a low to a high corner below the plane
     crossing = low[:, None] + part[..., None] * (high - low[:, None])
     return _hull_of(hull.name, np.concatenate([low, crossing.reshape(-1, 3)]))
 

@@ -106,6 +106,7 @@ def _turn(scene: Any, mark: TurnRing) -> None:
     points = mark.center + mark.radius_m * (np.outer(np.cos(angles), u) + np.outer(np.sin(angles), v))
     for a, b in pairwise(points):
         _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, mark.color, _WIDTH_M / 2)
+    # An arrow head at both ends, along the last piece of the ring there.
     for end, before in ((points[0], points[1]), (points[-1], points[-2])):
         along = (end - before) / np.linalg.norm(end - before)
         _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, end - 1e-3 * along, end + _HEAD_M * along, mark.color)

@@ -120,6 +120,7 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
         far = np.linalg.norm(across, axis=1)
         outwards = -across / np.maximum(far, PARALLEL)[:, None]
         tangent = _tangents(face, outwards, clearance_m)
+        # Sides that are tangent to the hole: same slope along the axis, then same distance.
         on = (np.abs(n @ face.axis - tangent[:, :3] @ face.axis) < PARALLEL) & (far > PARALLEL)
         on &= np.abs(piece.planes[:, 3] - tangent[:, 3]) < ON_M
         # Exactly one side on the surface: a wedge of this hole.
@@ -127,10 +128,10 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
             wedges.append((piece, outwards[on][0], _sector(face, outwards[on][0])))
     if not wedges:
         return
-    widest = max(face.radii) + clearance_m * face.fit
+    widest = max(face.radii) + clearance_m * face.fit  # largest radius of the hole, with clearance
     for hull, outwards, u in wedges:
         out = (hull.corners - face.point) @ u
-        thick = min(_THICK_M, (float(out.max()) - widest) / 2)
+        thick = min(_THICK_M, (float(out.max()) - widest) / 2)  # at most half of the material behind the wall
         # A piece that lies only far beyond the wall is left whole, as beside a pocket with rounded corners.
         if thick > _THINNEST_M and out.min() < widest + thick:
             yield _Wall(hull, face, outwards, np.append(u, u @ face.point + widest + thick), widest + thick)
@@ -177,7 +178,7 @@ def _as_one(a: _Wall, b: _Wall, first: Hull, clearance_m: float) -> Hull | None:
 
 def _sector(face: RoundFace, outwards: Array) -> Array:
     """The middle direction, (3,), of the sector around the axis that contains `outwards`."""
-    x = face.frame[:3, 0]
+    x = face.frame[:3, 0]  # directions across the axis of the face: x, y
     y = face.frame[:3, 1]
     turn = 2.0 * np.pi / _SECTORS
     angle = turn * np.round(np.arctan2(outwards @ y, outwards @ x) / turn)

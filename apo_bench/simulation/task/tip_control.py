@@ -210,6 +210,7 @@ class TipControl:
         direction = self.start.transfer.into.direction
         T = robot.T
         off = self._off(T)
+        # Limits of the front's position, in the frame of the axis.
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
         # Velocity of the front by the action, world; it also corrects the linearisation error of the last period.
@@ -225,7 +226,7 @@ class TipControl:
         turning = back @ twist
         shifting = back[:, :3] @ R.T
         q = robot.q
-        left = self._left - float(off[2])
+        left = self._left - float(off[2])  # distance to the goal, [m]
         for _ in range(steps):
             f = np.array(self._filtered(self._force, dt))
             push = -float(f @ direction)
@@ -233,6 +234,7 @@ class TipControl:
             yields = _YIELD * f
             if self.nominal:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
+                # Fast: unfiltered force, since the filter would react too late.
                 struck = -float(np.dot(self._force, direction)) if self._speed > _STRUCK else push
                 if self._stopped is None and max(struck, side) > self._guard:
                     # First contact: continue from the measured joint angles, which takes the pressure away.
