@@ -24,7 +24,8 @@ What one correction by `contact` calls, in the folder `contact` unless another i
             contact._report                 the Correction
             checks.status.check_facing      `inconsistent` where faces look the same way
 
-`solvers` know equations, `checks` refuse, end and test a correction. `baselines` are what `contact` is compared with
-(`paper` is the method as it was published), `robust` is the corrector that doubts observations, `calibration` estimates
-the errors of the robot from contact probing. The files outside these folders are the public calls.
+`solvers` solves equations; `checks` validates and tests corrections. `baselines` holds the correctors that `contact` is
+compared with (`paper` is the method as it was published). `robust` is the corrector that rejects outliers, and
+`calibration` estimates the errors of the robot from contact probing. The files outside these folders are the public
+calls.
 """
