@@ -1,6 +1,4 @@
-"""True poses of a trial: the layout before any human error, and the demonstration after it, without measurement
-error.
-"""
+"""True poses of a trial, without measurement error: the intended layout, and the demonstration after human error."""
 
 from dataclasses import dataclass
 from typing import final

@@ -46,6 +46,7 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
+        """Whether any stage failed."""
         return self.stage != "done"
 
 

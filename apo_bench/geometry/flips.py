@@ -1,6 +1,4 @@
-"""Approximate symmetries: quarter and half turns after which a part nearly looks the same, so that it may be
-misjudged.
-"""
+"""Approximate symmetries: quarter and half turns after which a part nearly looks the same to a pose estimator."""
 
 from typing import NamedTuple
 

@@ -1,7 +1,7 @@
-"""Calibration of a robot by contact probing: hand-eye, encoders, tool, and how each part lies in the hand.
+"""Calibration of a robot by contact probing: hand-eye displacement, encoders, tool, and slip of parts in the hand.
 
-A touch is a contact equation on the robot instead of on a pose: a point of the hand, or of what it holds, lies on a
-known plane. `make_prior_estimate` begins with what is stated of the robot, `RobotEstimate.touch` learns from touches.
+A touch is a contact equation for the robot instead of a pose: a point of the hand, or of a held part, lies on a known
+plane. `make_prior_estimate` starts from the stated errors of the robot; `RobotEstimate.touch` updates it by touches.
 """
 
 from apo_bench.assembly.touch import Touch

@@ -1,4 +1,4 @@
-"""The estimate of a robot's calibration errors from touches, its covariance, and the commands that make up for them."""
+"""Estimate of a robot's calibration errors from touches, with covariance, and commands that compensate for them."""
 
 from dataclasses import dataclass, replace
 from typing import final
@@ -25,32 +25,33 @@ from apo_bench.geometry import Array, copy_frozen, freeze, make_copyable, pose
 from apo_bench.records.robot_error import Sigmas
 
 UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
-"""[mm, deg], of a robot whose errors are not stated: a published automatic calibration of hand and eye ends at
-0.93 mm and 0.27 degrees (arXiv 2311.01335)."""
+"""Standard deviations for a robot whose errors are not stated, [mm, deg]. A published automatic calibration of hand and
+eye ends at 0.93 mm and 0.27 degrees (arXiv 2311.01335)."""
 
 
 @final
 @make_copyable
 @dataclass(frozen=True, eq=False)
 class RobotEstimate:
-    """Mean and covariance of all unknowns of `robot_model`, after all touches so far."""
+    """Mean and covariance of the u unknowns of `robot_model`, given all touches so far."""
 
     middle: Array
-    """(3,), [m], world frame: what a turn between hand and eye turns about."""
+    """(3,), [m], world frame: the centre of the rotation between hand and eye."""
     joints: int
+    """Number of joints of the arm."""
     grasps: tuple[int | None, ...]
-    """The number of each grasp in the order in which they were made; None: another one has its number now."""
+    """The number of each grasp in order; None for a grasp that is over since another one has its number."""
     sigmas: Array
     """(u,): prior standard deviations, [m, rad]."""
     mean: Array
     """(u,), [m, rad]."""
     covariance: Array
-    """(u, u), to first order: with `UNKNOWN` regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
-    5 um, where what the robot's errors make to second order is no longer small."""
+    """(u, u), to first order. With `UNKNOWN`, regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
+    5 um, where second-order effects of the robot's errors are no longer small."""
     felt: tuple[NumberedTouch, ...] = ()
-    """All touches so far, with the grasps that they are of."""
+    """All touches so far, each with the index of its grasp."""
     taken: tuple[bool, ...] = ()
-    """Which of them count."""
+    """Which of the touches are used."""
 
     def __post_init__(self) -> None:
         u = len(self.sigmas)
@@ -58,12 +59,12 @@ class RobotEstimate:
 
     @property
     def hand_eye(self) -> Array:
-        """The estimated displacement from the world's frame of the robot to the true one, (4, 4), [m]."""
+        """The estimated displacement from the assumed world frame of the robot to the true one, (4, 4), [m]."""
         return hand_eye_displacement(self.mean, self.middle)
 
     @property
     def tool(self) -> Array:
-        """The estimated shift of the tip on the hand, (3,), in its own frame, [m]."""
+        """The estimated offset of the tip, (3,), in its own frame, [m]."""
         return self.mean[TOOL]
 
     @property
@@ -73,17 +74,17 @@ class RobotEstimate:
 
     @property
     def touches(self) -> tuple[Touch, ...]:
-        """Those that count."""
+        """The touches that are used."""
         return tuple(touch for (touch, _), counts in zip(self.felt, self.taken, strict=True) if counts)
 
     @property
     def refused(self) -> tuple[Touch, ...]:
-        """Touches that contradict the others and the priors; they may count again after later ones."""
+        """Touches that contradict the others and the priors; later touches may make them count again."""
         return tuple(touch for (touch, _), counts in zip(self.felt, self.taken, strict=True) if not counts)
 
     @property
     def found(self) -> ProbingResult:
-        """What has been found out, in short: how far hand and eye are apart, and how uncertain that is."""
+        """Summary: estimated hand-eye displacement, its uncertainty, and numbers of touches."""
         xi = self.mean[HAND_EYE]
         variances = self.covariance[HAND_EYE, HAND_EYE].diagonal()
         return ProbingResult(
@@ -96,10 +97,11 @@ class RobotEstimate:
         )
 
     def grasp(self, number: int, sigmas: ArrayLike) -> "RobotEstimate":
-        """A part was grasped; a grasp of the same number is over, but its touches are kept.
+        """Add the unknowns of a new grasp; an earlier grasp of the same number is over, but its touches are kept.
 
         Args:
-            sigmas: (6,): how far it may have moved in the hand, a twist in the frame of the tip, [m, rad]; 0 is exact.
+            sigmas: (6,): standard deviations of the slip in the hand, a twist in the frame of the tip, [m, rad]; 0 is
+                exact.
         """
         new = _checked_sigmas(sigmas, 6)
         u = len(self.sigmas)
@@ -116,7 +118,7 @@ class RobotEstimate:
         )
 
     def touch(self, *touches: Touch) -> "RobotEstimate":
-        """Update the estimate by further touches, from all of them and the priors.
+        """Update the estimate by further touches; it is computed from all touches and the priors.
 
         Raises:
             InputError: No touch, one of a grasp that was not made, or with a Jacobian of other joints.
@@ -129,26 +131,28 @@ class RobotEstimate:
         return replace(self, mean=mean, covariance=covariance, felt=felt, taken=tuple(taken.tolist()))
 
     def real(self, T_world_tip: ArrayLike, jacobian: ArrayLike | None = None) -> Array:
-        """Where the tip really is, (4, 4), if the robot assumes it at `T_world_tip`, (4, 4), [m]."""
+        """The true pose of the tip, (4, 4), if the robot assumes it at `T_world_tip`, (4, 4), [m]."""
         B = checked_pose("pose of the tip", T_world_tip)
         offset = tip_displacement(self.mean, self._jacobian(jacobian))
         return hand_eye_displacement(self.mean, self.middle) @ B @ offset
 
     def command(self, T_world_tip: ArrayLike, jacobian: ArrayLike | None = None) -> Array:
-        """The pose of the tip to command, (4, 4), so that it really comes to `T_world_tip`; inverse of `real`."""
+        """The pose of the tip to command, (4, 4), so that its true pose is `T_world_tip`; inverse of `real`."""
         X = checked_pose("pose of the tip", T_world_tip)
         offset = tip_displacement(self.mean, self._jacobian(jacobian))
         return pose.inverse(hand_eye_displacement(self.mean, self.middle)) @ X @ pose.inverse(offset)
 
     def held(self, grasp: int, T_tip_part: ArrayLike) -> Array:
-        """Where a part really lies in the frame of the tip, (4, 4), that the robot assumes at `T_tip_part`, (4, 4)."""
+        """The true pose of a held part in the frame of the tip, (4, 4), if the robot assumes it at `T_tip_part`, (4,
+        4).
+        """
         gamma = self.mean[grasp_in(self.joints, self._grasp(grasp))]
         return pose.exp(gamma) @ checked_pose("pose of the part in the hand", T_tip_part)
 
     def goal_tip(
         self, T_world_part: ArrayLike, grasp: int, T_tip_part: ArrayLike, jacobian: ArrayLike | None = None
     ) -> Array:
-        """The pose of the tip to command, (4, 4), so that a part that is held really comes to `T_world_part`."""
+        """The pose of the tip to command, (4, 4), so that the true pose of a held part is `T_world_part`."""
         goal = checked_pose("goal of the part", T_world_part)
         return self.command(goal @ pose.inverse(self.held(grasp, T_tip_part)), jacobian)
 
@@ -159,7 +163,7 @@ class RobotEstimate:
         grasp: int | None = None,
         T_tip_part: ArrayLike | None = None,
     ) -> Array:
-        """How the body twist of the held part, or of the tip, depends on the unknowns, (6, u), at this command.
+        """The derivative of the body twist of the held part, or of the tip, by the unknowns, (6, u), at this command.
 
         The covariance of the difference of two places is (D - D') `covariance` (D - D')^t, with twists in one frame.
         """
@@ -175,12 +179,12 @@ class RobotEstimate:
         grasp: int | None = None,
         T_tip_part: ArrayLike | None = None,
     ) -> Array:
-        """How uncertain is where the held part, or the tip, really comes to be: (6, 6) of its body twist, [m, rad]."""
+        """The covariance of the true pose of the held part, or of the tip: (6, 6) of its body twist, [m, rad]."""
         D = self.jacobian_of(T_world_tip, jacobian, grasp, T_tip_part)
         return D @ self.covariance @ D.T
 
     def _grasp(self, number: int | None) -> int:
-        """Which of the grasps that were made has a number now; -1 for the empty hand."""
+        """The index in `grasps` of a grasp number; -1 for the empty hand (None)."""
         if number is None:
             return -1
         made = ", ".join(str(one) for one in self.grasps if one is not None) or "none"
@@ -188,17 +192,17 @@ class RobotEstimate:
         return self.grasps.index(number)
 
     def _jacobian(self, jacobian: ArrayLike | None) -> Array:
-        """(6, joints): zeros if none was given."""
+        """The checked Jacobian, (6, joints); zeros if None."""
         return np.zeros((6, self.joints)) if jacobian is None else copy_frozen(jacobian, 6, self.joints)
 
 
 @check_arguments
 def make_prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
-    """The estimate before the first touch: no error, with the stated standard deviations.
+    """The estimate before any touch: all errors 0, with the stated standard deviations.
 
     Args:
         sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where they are not stated.
-        joints: How many joints the arm has.
+        joints: Number of joints of the arm.
         middle: (3,), [m], world frame: the mean of the poses.
     """
     require(joints >= 0, f"{joints} joints were given; give the number of joints of the arm.")
@@ -212,12 +216,13 @@ def make_prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> Robot
 
 
 def compute_slip_sigmas(sigmas: Sigmas) -> Array:
-    """How far a part may slip in the hand, (6,), [m, rad]: along the pads, y and z of the tip, and about x."""
+    """Standard deviations of the slip of a part in the hand, (6,), [m, rad]: along y and z of the tip, and about x."""
     mm, deg = sigmas.in_hand
     return np.array([0.0, 1e-3 * mm, 1e-3 * mm, np.radians(deg), 0.0, 0.0])
 
 
 def _checked_sigmas(sigmas: ArrayLike, n: int) -> Array:
+    """A read-only copy of n standard deviations, none of them negative."""
     checked = copy_frozen(sigmas, n)
     require((checked >= 0.0).all(), f"a standard deviation of {checked.min():g} was given; 0 or more is allowed.")
     return checked

@@ -1,11 +1,11 @@
-"""Where a robot with unknown errors really goes: the forward model of its unknowns, with its derivative.
+"""Forward model of a robot with calibration errors: true poses of tip and held parts, with derivatives.
 
     T_world_part = E B exp(J delta) shift(tau) exp(gamma) T_tip_part,  E = M exp(xi) M^-1
 
-B is where the robot assumes its tip, xi the displacement between hand and eye, a twist at the middle of the poses (M is
-the shift there), delta the zeros of the encoders, J the body Jacobian at B, tau the shift of the tool, and gamma how
-the part moved in the hand, a twist in the frame of the tip. The vector of unknowns is (xi, tau, delta, gamma of the
-first grasp, of the second, ..), [m, rad].
+B is the assumed pose of the tip. xi is the displacement between hand and eye, a twist at the middle of the poses (M is
+the shift there). delta are the offsets of the encoders, J is the body Jacobian at B, tau the offset of the tool. gamma
+is the slip of the part in the hand, a twist in the frame of the tip. The vector of unknowns is (xi, tau, delta, gamma
+of the first grasp, of the second, ..), [m, rad].
 """
 
 from typing import NamedTuple
@@ -15,53 +15,55 @@ import numpy as np
 from apo_bench.geometry import Array, Ints, compute_exp_and_jacobian, pose
 
 HAND_EYE = slice(0, 6)
+"""Indices of xi among the unknowns."""
 TOOL = slice(6, 9)
+"""Indices of tau among the unknowns."""
 
 
 class Places(NamedTuple):
-    """t places of what a robot holds, or of its tip."""
+    """t assumed poses of the tip, or of what the robot holds."""
 
     T_world_tip: Array
     """(t, 4, 4): B, [m]."""
     jacobian: Array
-    """(t, 6, joints), [m/rad, rad/rad]; zeros: as if the encoders were exact."""
+    """(t, 6, joints), [m/rad, rad/rad]; zeros: the encoders count as exact."""
     T_tip_part: Array
-    """(t, 4, 4), [m]: where the part is assumed; the identity for the tip."""
+    """(t, 4, 4), [m]: the assumed pose of the part; the identity for the tip."""
     grasp: Ints
-    """(t,): which of the grasps that were made, from 0; -1: the hand is empty."""
+    """(t,): index of the grasp, from 0; -1: the hand is empty."""
 
 
 def joints_in(joints: int) -> slice:
-    """Where the zeros of the encoders stand among the unknowns."""
+    """Indices of the encoder offsets among the unknowns."""
     return slice(TOOL.stop, TOOL.stop + joints)
 
 
 def grasp_in(joints: int, k: int) -> slice:
-    """Where the twist of the k-th grasp that was made, from 0, stands among the unknowns."""
+    """Indices of the twist of grasp k, from 0, among the unknowns."""
     first = TOOL.stop + joints + 6 * k
     return slice(first, first + 6)
 
 
 def hand_eye_displacement(unknowns: Array, middle: Array) -> Array:
-    """E, (4, 4)."""
+    """The displacement E, (4, 4), from the unknowns."""
     M = pose.rigid(np.eye(3), middle)
     return np.asarray(M @ pose.exp(unknowns[HAND_EYE]) @ pose.inverse(M))
 
 
 def tip_displacement(unknowns: Array, J: Array) -> Array:
-    """exp(J delta) shift(tau), (4, 4): from where the robot assumes its tip to where it is, but for E."""
+    """exp(J delta) shift(tau), (4, 4): from the assumed to the true pose of the tip, without E."""
     return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ pose.rigid(np.eye(3), unknowns[TOOL]))
 
 
 def compute_part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:
-    """Where the parts really are, and how their body twists depend on the unknowns.
+    """The true poses of the parts, and the derivatives of their body twists by the unknowns.
 
     Args:
         unknowns: (u,).
         middle: (3,), [m], world frame.
 
     Returns:
-        T_world_part, (t, 4, 4), and D, (t, 6, u): unknowns that are more by d make it T_world_part exp(D d).
+        T_world_part, (t, 4, 4), and D, (t, 6, u): adding d to the unknowns makes the pose T_world_part exp(D d).
     """
     B, J, T_tip_part, grasp = places
     M = pose.rigid(np.eye(3), middle)
@@ -74,7 +76,7 @@ def compute_part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[
     moved, D_delta = compute_exp_and_jacobian(J @ unknowns[joints])
     slipped, D_gamma = compute_exp_and_jacobian(gamma)
     D = np.zeros((len(grasp), 6, len(unknowns)))
-    # From the last factor of the product to the first: a twist before T is the twist Ad(T^-1) of it behind T.
+    # From the last factor of the product to the first: a twist x before T is the twist Ad(T^-1) x behind T.
     T = T_tip_part
     D[holds[:, None], :, columns] = np.swapaxes(_behind(T, D_gamma)[holds], 1, 2)
     T = slipped @ T
@@ -87,5 +89,5 @@ def compute_part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[
 
 
 def _behind(T: Array, twists: Array) -> Array:
-    """The twists behind T, (t, 6, k), that do what twists before it do."""
+    """The twists behind T, (t, 6, k), that are equivalent to twists before it."""
     return np.asarray(pose.adjoint(pose.inverse(T)) @ twists)

@@ -1,7 +1,7 @@
-"""The unknowns of a robot that are most probable after touches, and which touches to refuse.
+"""Most probable calibration errors given touches, and rejection of touches that contradict the others.
 
-Maximum a posteriori of Gaussian priors and Gaussian touches: the smallest sum of squares of z and of what each touch
-is off over its sigma, where the unknowns are the sigmas times z; Gauss-Newton, all touches each time.
+Maximum a posteriori with Gaussian priors and touches: minimises the squares of z and of the residual of each touch over
+its sigma, where the unknowns are the prior sigmas times z. Solved by Gauss-Newton, with all touches each time.
 """
 
 from typing import NamedTuple
@@ -14,16 +14,18 @@ from apo_bench.correction.calibration.robot_model import Places, compute_part_po
 from apo_bench.geometry import Array, pose
 
 REFUSED_BEYOND = 5.0
-"""A touch that all others and the priors predict so badly, in standard deviations, is refused."""
+"""A touch is rejected if its deviation from the prediction of all others and the priors exceeds this, in standard
+deviations."""
 _MOST_STEPS = 2000
+"""Most Gauss-Newton steps."""
 _SMALL = 1e-9
-"""The last step, in prior standard deviations."""
+"""Size of the step after which the solver has converged, in prior standard deviations."""
 _ROUNDING = 1e-14
-"""A sum that is larger by no more than this part is the same."""
+"""Relative increase of the sum of squares that counts as rounding."""
 
 
 class NumberedTouch(NamedTuple):
-    """A touch, and which of the grasps that were made it is of, from 0; -1: the hand was empty."""
+    """A touch with the index of its grasp, from 0; -1: the hand was empty."""
 
     touch: Touch
     grasp: int
@@ -52,12 +54,11 @@ class TouchEquations(NamedTuple):
 
 
 def robust_estimate(felt: tuple[NumberedTouch, ...], sigmas: Array, joints: int, middle: Array) -> Estimate:
-    """The estimate from all touches but those that contradict the others and the priors.
+    """Estimate the unknowns from all touches but those that contradict the others and the priors.
 
-    As long as a touch is farther off than `REFUSED_BEYOND` standard deviations of what all others and the priors
-    predict, the worst one is left out. Then those that fit again, as a worse one is gone, are taken back, the best one
-    first. All touches are judged again each time, so their order does not matter, and a touch that was refused counts
-    as soon as others agree with it.
+    While a touch deviates by more than `REFUSED_BEYOND` from the prediction of all others, the worst one is left out.
+    Then touches that fit again without it are taken back, the best one first. All touches are judged again in each
+    call, so their order does not matter.
 
     Args:
         sigmas: (u,): prior standard deviations of the unknowns, [m, rad].
@@ -89,6 +90,7 @@ def robust_estimate(felt: tuple[NumberedTouch, ...], sigmas: Array, joints: int,
 
 
 def _equations(felt: list[NumberedTouch], joints: int) -> TouchEquations:
+    """Stack touches into arrays."""
     t = len(felt)
     exact = np.zeros((6, joints))
     touches = [touch for touch, _ in felt]
@@ -108,7 +110,7 @@ def _equations(felt: list[NumberedTouch], joints: int) -> TouchEquations:
 
 
 def _most_probable(equations: TouchEquations, sigmas: Array, middle: Array) -> tuple[Array, Array, Array]:
-    """The z that minimises |z|^2 + |residuals|^2, and the residuals near it, A z - y."""
+    """The z that minimises |z|^2 + |residuals|^2, with A and y of the residuals near it, A z - y."""
     z = np.zeros(len(sigmas))
     A, y = _linearise(equations, sigmas, middle, z)
     for _ in range(_MOST_STEPS):
@@ -126,7 +128,7 @@ def _most_probable(equations: TouchEquations, sigmas: Array, middle: Array) -> t
 
 
 def _sum(z: Array, A: Array, y: Array) -> float:
-    """What is minimised, at z itself."""
+    """The sum of squares that is minimised, at z, with A and y linearised there."""
     off = A @ z - y
     return float(z @ z + off @ off)
 
@@ -149,7 +151,7 @@ def _triangle(A: Array) -> Array:
 
 
 def _surprises(A: Array, y: Array) -> Array:
-    """How far each y is from what the others predict, (t,), in standard deviations of that.
+    """The deviation of each y from the prediction of the others, (t,), in standard deviations of that.
 
     A priori y has the covariance S = 1 + A A^t. Given the others, y_i is off by (S^-1 y)_i / (S^-1)_ii, of which the
     variance is 1 / (S^-1)_ii.

@@ -188,6 +188,7 @@ class SolvedHypothesis:
         return not (away & observation.assembly.without(self.dropped)).any()
 
     def _faces_oppose(self) -> bool:
+        """Whether the faces of every contact that is not dropped oppose at the corrected poses."""
         return self.stands_at(self.correction.poses)
 
     @property

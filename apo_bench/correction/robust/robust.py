@@ -101,6 +101,7 @@ class RobustCorrector:
         return _report(observation, first or best, search, with_room(best).scale_noise(), again)
 
     def _model(self, observation: Observation) -> OutlierModel:
+        """The outlier model: that of the corrector, or else of the observation, or else the default."""
         return self.outliers or observation.outliers or OutlierModel()
 
     def _is_plain(self, observation: Observation) -> bool:

@@ -82,6 +82,7 @@ class _Corners(NamedTuple):
 
 @remember
 def _corners(assembly: Assembly) -> _Corners:
+    """Compute the pose-independent part of an assembly's contacts."""
     known = find_contact_pattern(assembly)
     normal = np.array(known.onto)
     normal[:, 3] = 0.0
