@@ -1,8 +1,8 @@
 """Check the arguments of public functions and constructors against their annotations.
 
-An argument of another type raises one sentence. NumPy's numbers count as numbers, lists are taken for tuples and
-arrays, and a text where several names may stand is one name, never its letters. Functions check ranges and shapes
-themselves.
+An argument of another type raises an error with one sentence. Numbers of NumPy count as numbers; lists are accepted as
+tuples and arrays. Where several names are allowed, a text is one name, not a sequence of letters. Functions check
+ranges and shapes themselves.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -20,25 +20,25 @@ Public = TypeVar("Public", bound=Callable[..., Any])
 
 
 class _Unfit(Exception):
-    """A value, or an entry of one, is not of a type; its argument is what is not."""
+    """Raised for a value, or an entry of one, of the wrong type; its argument is that value or entry."""
 
 
 class _Type(NamedTuple):
-    """What an annotation stands for."""
+    """The check that an annotation describes."""
 
     words: str
-    """What is needed: `a number`."""
+    """The type in words: `a number`."""
     take: Callable[[Any], Any]
-    """Returns a value as the function takes it, or raises `_Unfit`."""
+    """Returns a value converted for the function, or raises `_Unfit`."""
 
 
 def check_arguments(public: Public) -> Public:
     """Make a function, or the constructor of a class, check its arguments against its annotations.
 
-    Annotations are read at the first call. Python itself refuses an argument that is missing.
+    Annotations are read at the first call. Python itself rejects a call without a required argument.
 
     Raises:
-        ArgumentError: When called with an argument of another type, or with an unknown keyword.
+        ArgumentError: On a call with an argument of another type, or with an unknown keyword.
     """
     function: Any = vars(public)["__init__"] if isinstance(public, type) else public
     called = public.__qualname__.removesuffix(".__call__")
@@ -65,7 +65,7 @@ def check_arguments(public: Public) -> Public:
         if not takes_any and not named.keys() <= keywords:
             name = next(name for name in named if name not in keywords)
             raise ArgumentError(unknown(f"argument of {called}", name, keywords - {"self"}))
-        values = (*map(take, positional, given), *given[len(positional) :])
+        values = (*map(take, positional, given), *given[len(positional) :])  # surplus arguments are left to Python
         return function(*values, **{name: take(name, value) for name, value in named.items()})
 
     if isinstance(public, type):
@@ -75,7 +75,7 @@ def check_arguments(public: Public) -> Public:
 
 
 def _read(hint: Any) -> _Type:
-    """Return what an annotation stands for."""
+    """Return the check of an annotation."""
     origin = get_origin(hint) or hint
     within = get_args(hint)
     if hint in _PLAIN:
@@ -102,6 +102,7 @@ def _read(hint: Any) -> _Type:
 
 
 def _is_unchecked_protocol(origin: type) -> bool:
+    # isinstance does not work with a protocol that is not runtime-checkable
     return getattr(origin, "_is_protocol", False) and not getattr(origin, "_is_runtime_protocol", False)
 
 
@@ -111,7 +112,7 @@ def _require(fits: object, value: Any) -> None:
 
 
 def _that(words: str, fits: Callable[[Any], object]) -> _Type:
-    """The type of values that fit, which stay as they are."""
+    """Return the check of a condition on a value, which is not converted."""
 
     def take(value: Any) -> Any:
         _require(fits(value), value)
@@ -125,14 +126,15 @@ def _is_number(value: Any) -> bool:
 
 
 def _whole(value: Any) -> Any:
-    """Return a whole number as it is, or a number that is one, such as 2.0, as an int."""
+    """Return a whole number as it is, or a float with a whole value, such as 2.0, as an int."""
     if type(value) is int:
         return value
     _require(_is_number(value) and (isinstance(value, Integral) or float(value).is_integer()), value)
     return value if isinstance(value, Integral) else int(value)
 
 
-_USUAL_NUMBERS = (float, int)  # asked first: to ask for any real number takes ten times as long
+# checked first, since an isinstance check with Real takes ten times as long
+_USUAL_NUMBERS = (float, int)
 _ANYTHING = _that("anything", lambda _: True)
 _NONE = _that("None", lambda x: x is None)
 _PLAIN: Mapping[Any, _Type] = {
@@ -148,7 +150,7 @@ _PLAIN: Mapping[Any, _Type] = {
 
 
 def _one_of(types: list[_Type]) -> _Type:
-    """The first of several types that a value is of."""
+    """Return a check that accepts a value of any of several types, tried in order."""
 
     def take(value: Any) -> Any:
         last = _Unfit(value)
@@ -164,10 +166,11 @@ def _one_of(types: list[_Type]) -> _Type:
 
 
 def _array(is_truth: bool) -> _Type:
-    """An array of real numbers; or of truth values, which may be 0 and 1."""
+    """Return the check of an array of real numbers; or of booleans, given also as 0 and 1."""
     usual = np.dtype(np.bool_ if is_truth else np.float64)
 
     def take(value: Any) -> Any:
+        # the usual case, without a conversion
         if type(value) is np.ndarray and value.dtype == usual and value.ndim:
             return value
         try:
@@ -181,9 +184,9 @@ def _array(is_truth: bool) -> _Type:
 
 
 def _several(origin: type, within: tuple[Any, ...]) -> _Type:
-    """Several values, made a tuple or a set where one is needed; a text is one of them, never its letters."""
+    """Return the check of a collection, converted to a tuple or set where needed; a text is a single entry."""
     entries = [_read(each) for each in within if each is not Ellipsis]
-    count = len(entries) if origin is tuple and Ellipsis not in within else None
+    count = len(entries) if origin is tuple and Ellipsis not in within else None  # fixed length of a tuple
     make: Any = origin if origin in (tuple, list, set, frozenset) else tuple
 
     def take(value: Any) -> Any:
@@ -199,9 +202,9 @@ def _several(origin: type, within: tuple[Any, ...]) -> _Type:
 
 
 def _named_tuple(origin: Any) -> _Type:
-    """A record that is a tuple; a plain one, or a list, is made one."""
+    """Return the check of a named tuple, which is made from a plain tuple or a list if needed."""
     types = [_read(hint) for hint in get_type_hints(origin, include_extras=True).values()]
-    least = len(types) - len(origin._field_defaults)
+    least = len(types) - len(origin._field_defaults)  # fields without a default
 
     def take(value: Any) -> Any:
         _require(isinstance(value, tuple | list) and least <= len(value) <= len(types), value)
@@ -211,7 +214,7 @@ def _named_tuple(origin: Any) -> _Type:
 
 
 def _remade(value: Any, given: tuple[Any, ...], types: list[_Type], origin: type, make: Callable[[Any], Any]) -> Any:
-    """Return a value as it is if its entries are of their types, else what is made of them."""
+    """Return a value itself if no entry needs a conversion, else a new one with the converted entries."""
     taken = [one.take(each) for one, each in zip(types, given, strict=True)]
     is_same = isinstance(value, origin) and all(a is b for a, b in zip(taken, given, strict=True))
     return value if is_same else make(taken)

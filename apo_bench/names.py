@@ -1,4 +1,4 @@
-"""Resolve a short name, `module:name`, or the object itself."""
+"""Resolve a short name, `module:name`, or an object itself, to the object."""
 
 import importlib
 import sys
@@ -13,14 +13,15 @@ from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 SESSION = "session"
 """The module part of the name of a function that cannot be imported: `session:mine`."""
 _FOLDERS: list[str] = []
-"""Where modules that a person names may lie, too; the last one counts."""
+"""Folders that are searched for modules named by the user, after the import path; only the last one counts."""
 
 
 @contextmanager
 def own_modules_in(folder: str) -> Iterator[None]:
-    """Find modules that are named as `module:name` in a folder as well, for a while.
+    """Search modules named as `module:name` also in a folder, for the duration of the context.
 
-    While such a module is imported, it finds what lies beside it. Nothing else in the folder is ever imported.
+    While such a module is imported, it can import modules of its folder. No other module of the folder is ever
+    imported.
     """
     _FOLDERS.append(folder)
     try:
@@ -30,17 +31,17 @@ def own_modules_in(folder: str) -> Iterator[None]:
 
 
 def add_own_modules(folder: str) -> None:
-    """Find modules in a folder as `own_modules_in` does, from now on; nowhere if it is empty."""
+    """Search modules also in a folder, as `own_modules_in` does, from now on; an empty text adds none."""
     _FOLDERS.extend([folder] * bool(folder))
 
 
 def folder_of_own_modules() -> str:
-    """Return the folder of `own_modules_in`, for another process; empty without one."""
+    """Return the folder of `own_modules_in`, to pass it to another process; empty without one."""
     return _FOLDERS[-1] if _FOLDERS else ""
 
 
 def find_own_module(name: str) -> ModuleSpec | None:
-    """Find a module that lies in the folder of `own_modules_in`; None if there is none."""
+    """Return the specification of a module in the folder of `own_modules_in`; None if there is none."""
     return PathFinder.find_spec(name, _FOLDERS[-1:])
 
 
@@ -84,7 +85,7 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
 
 
 def _import_named(name: str) -> ModuleType:
-    """Import a module that a person named."""
+    """Import a module that the user named, with its folder at the end of the import path during the import."""
     before = sys.path[:]
     if find_own_module(name.partition(".")[0]) is not None:
         sys.path += _FOLDERS[-1:]

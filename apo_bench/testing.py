@@ -1,8 +1,8 @@
-"""Test the success rate of a method with as few trials as it takes.
+"""Test the success rate of a method with as few trials as possible.
 
 Wald's sequential probability ratio test (A. Wald, Sequential Tests of Statistical Hypotheses, Annals of Mathematical
-Statistics 16, 1945): after each trial the likelihood of the required rate is compared with that of the largest rate to
-reject, until one of them is (1 - error) / error times the other.
+Statistics 16, 1945) compares two rates after each trial: the required one, and the largest one to reject. It ends when
+the likelihood of one is (1 - error) / error times that of the other.
 """
 
 import math
@@ -26,13 +26,13 @@ from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
 
 _MOST = 100_000
-"""Trials that a test may take; with the usual error it takes some dozens."""
+"""Most trials that a test may take; with the usual error it takes some dozens."""
 
 
 @final
 @dataclass(frozen=True)
 class Decision:
-    """How a sequential test ended."""
+    """The result of a sequential test."""
 
     passed: bool
     successes: int
@@ -43,18 +43,20 @@ class Decision:
 def sequential_test(
     outcomes: Iterator[bool], at_least: float, margin: float, error: float = 0.01, most: int = _MOST
 ) -> Decision:
-    """Decide whether a success rate is high enough, with as few outcomes as it takes.
+    """Decide whether a success rate is high enough, with as few outcomes as possible.
 
     Args:
-        outcomes: Successes and failures, independent of each other; one after the other is taken.
-        at_least: With this rate or a higher one the test passes, except in `error` of all cases.
-        margin: With a rate that is lower by this or more it fails, except in `error` of all cases. Between the two
-            rates it may end either way.
-        most: Outcomes after which the likelier of the two rates decides, as it does where outcomes end; the sentence
+        outcomes: Independent successes and failures, of which only as many are taken as needed.
+        at_least: If the rate is at least this, the test passes, except with probability `error`.
+        margin: If the rate is lower by at least this, the test fails, except with probability `error`. In between,
+        either
+            result is possible.
+        most: Number of outcomes after which the likelier of the two rates decides, as at the end of `outcomes`; the
+        sentence
             states this.
 
     Raises:
-        InputError: Numbers that are not allowed, or no outcome.
+        InputError: A number is not allowed, or there is no outcome.
     """
     require(
         1e-6 <= margin < at_least <= 1.0,
@@ -63,7 +65,8 @@ def sequential_test(
     require(1e-9 <= error < 0.5, f"error={error:g} was given; a number from 1e-9 and below 0.5 is allowed.")
     require(most >= 1, f"most={most!r} was given; a whole number from 1 is allowed.")
     low = at_least - margin
-    success = math.log(at_least / low)
+    success = math.log(at_least / low)  # log likelihood ratio of one success
+    # log likelihood ratio of one failure
     failure = math.log((1.0 - at_least) / (1.0 - low)) if at_least < 1.0 else -math.inf
     bound = math.log((1.0 - error) / error)
     successes = trials = 0
@@ -77,7 +80,7 @@ def sequential_test(
     require(trials, "no outcome was given; at least one is needed.")
     passed = evidence > 0.0
     verdict = f"it is at least {at_least:g}" if passed else f"it is below {at_least:g}"
-    undecided = f", though it is not decided after {trials}" * (abs(evidence) < bound)
+    undecided = f", though it is not decided after {trials}" * (abs(evidence) < bound)  # the likelier rate decided
     return Decision(
         passed, successes, trials, f"{successes} of {format_count(trials, 'trial')} succeeded: {verdict}{undecided}"
     )
@@ -98,12 +101,12 @@ def assert_success_rate(
 
     Args:
         method: A method by name, or a corrector.
-        trials: A track, by name or file, all of its conditions in turn; or the settings of one condition.
+        trials: A track, by name or file, whose conditions are tried in turn; or the settings of one condition.
         at_least, margin, error, most: As in `sequential_test`.
-        seed: The first; every trial has the next one, so that trials are independent.
+        seed: The first seed; every trial has the next one, so that trials are independent.
 
     Raises:
-        InputError: A method, track or number that is not allowed.
+        InputError: A method, track or number is not allowed.
     """
     name = method if isinstance(method, str) else CORRECTOR
     corrector = None if isinstance(method, str) else method
@@ -118,7 +121,7 @@ def assert_success_rate(
 
 
 def _conditions(trials: Any, method: str) -> list[TrialConfig]:
-    """One trial of every condition."""
+    """Return one trial of every condition."""
     if isinstance(trials, Mapping):
         given = dict(trials)
         require("scenario" in given and "seed" not in given, "the settings need a scenario, and no seed; change them.")
@@ -131,7 +134,7 @@ def _conditions(trials: Any, method: str) -> list[TrialConfig]:
 
 
 def _outcomes(configs: list[TrialConfig], seed: int, corrector: Any, failures: list[str]) -> Iterator[bool]:
-    """Success of each trial that counts, conditions in turn, every trial with its own seed."""
+    """Yield the success of each trial that counts, conditions in turn, every trial with its own seed."""
     scenes: dict[Any, tuple[Scene, str]] = {}
     for i in count():
         config = replace(configs[i % len(configs)], seed=seed + i)

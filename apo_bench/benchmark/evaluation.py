@@ -17,6 +17,7 @@ from apo_bench.scenario import Scenario, find_scenario_path, is_named
 Method = str | Callable[..., Any]
 """A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)` poses."""
 
+# settings that may have several values, except methods
 _AXES = tuple(info.name for info in AXES if info.name != "method")
 
 
@@ -98,7 +99,7 @@ def evaluate(
 
 
 def _scenario_source(scenario: str | Path | Scenario) -> str:
-    """The name or the file of a scenario, which a worker loads."""
+    """Return the name or the file of a scenario, from which a worker loads it."""
     if not isinstance(scenario, Scenario):
         return str(scenario)
     require(
@@ -110,7 +111,7 @@ def _scenario_source(scenario: str | Path | Scenario) -> str:
 
 
 def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
-    """Labels of methods or noise models, and these."""
+    """Return pairs of label and value of methods or noise models; `kind` is `method` or `noise`."""
     if isinstance(given, Mapping):
         for label, each in given.items():
             require(isinstance(label, str), f"a label must be a text, got {shown(label)}.")
@@ -128,5 +129,6 @@ def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
 
 
 def _relabel(record: TrialRecord, labels: Mapping[str, str]) -> TrialRecord:
+    """Return a record with the labels that the caller gave."""
     method, noise = record["method"], record["noise"]
     return {**record, "method": labels.get(method, method), "noise": labels.get(noise, noise)}

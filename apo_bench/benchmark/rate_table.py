@@ -1,4 +1,4 @@
-"""The table that `evaluate` returns."""
+"""The table that `evaluate` returns: success rates by condition, with exports and plots."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from apo_bench.errors import missing_package, require
 from apo_bench.records import TrialRecord
 
 RUN_FILES = ("run.json", "trials.jsonl", "timing.jsonl")
-"""The files of a sweep's folder."""
+"""Files of a sweep's folder that `save` copies."""
 
 
 @final
@@ -23,10 +23,10 @@ class RateTable:
     """
 
     records: tuple[TrialRecord, ...]
-    """The record of each trial, with methods by the labels that were given."""
+    """The record of each trial; methods have the labels that the caller gave."""
     folder: Path
-    """The folder with the records as `apo-bench sweep` writes them."""
-    _temporary: TemporaryDirectory[str] | None = None
+    """The folder with the records, as `apo-bench sweep` writes them."""
+    _temporary: TemporaryDirectory[str] | None = None  # keeps a temporary folder as long as the table exists
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -102,7 +102,7 @@ class RateTable:
 
 
 def _align(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:
-    """Lines of cells as text, in columns: words to the left, numbers to the right."""
+    """Yield lines of cells as aligned text: columns with `words` to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     for line in lines:
         cells = zip(line, widths, words, strict=True)

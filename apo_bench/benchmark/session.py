@@ -1,4 +1,4 @@
-"""Functions of this process under names that settings can have, for the duration of a run."""
+"""Give functions of this process names that settings can have, for the duration of a run."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -13,16 +13,16 @@ from apo_bench.names import SESSION, importable_name
 
 @contextmanager
 def name_functions(functions: Mapping[str, Callable[..., Any]]) -> Iterator[Mapping[str, str]]:
-    """Give functions names that settings can have, label -> name.
+    """Give functions names that settings can have; yields label -> name.
 
-    A function of a module that can be imported is `module:name`. Others, such as lambdas and functions of a notebook,
+    The name of a function that can be imported is `module:name`. Others, such as lambdas and functions of a notebook,
     are `session:label` until the context ends, in this process only.
 
     Raises:
         InputError: A label is no Python name.
     """
     names = {label: importable_name(function) or f"{SESSION}:{label}" for label, function in functions.items()}
-    module = ModuleType(SESSION)
+    module = ModuleType(SESSION)  # a module that exists only as long as the context
     module.__spec__ = ModuleSpec(SESSION, None)
     for label, function in functions.items():
         require(label.isidentifier(), f"the method label {label!r} was given; use a Python name, such as my_method.")

@@ -65,5 +65,6 @@ class APOAssemble(APOInsert):
         return {}
 
     def _seen(self) -> Seen:
+        # one-hot vector of the current operation
         place = np.arange(len(self._now().plan.assembly)) == self.operation - 1
         return {**super()._seen(), "operation": place.astype(np.float32)}

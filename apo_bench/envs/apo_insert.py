@@ -42,16 +42,16 @@ from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 Seen = dict[str, Any]
 Action = NDArray[np.float32]
 ROBOT_ERROR = "hand_eye:0.5/0.1"
-"""The default robot error."""
+"""Default robot error: hand-eye calibration error, 0.5 mm and 0.1 degrees (1 sigma per axis)."""
 RELEASE = 0.5
-"""The last number of an action above which the hand opens; below its negative it stays closed."""
+"""The hand opens if the last number of an action is above this; below its negative the approach keeps it closed."""
 MOST_TRIES = 100
-"""Trials in a row that fail before the operation after which `reset()` gives up."""
+"""`reset()` gives up after this many drawn trials in a row that fail before the operation."""
 HORIZON = 200
 """Default number of actions of an operation."""
 _REWARDS = ("judge", "progress")
 _STARTS = ("training", "evaluation")
-_PLANS = ("uncorrected", "oracle", "nominal")
+_PLANS = ("uncorrected", "oracle", "nominal")  # plans that need no corrector
 
 
 @check_arguments
@@ -191,19 +191,19 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._horizon = int(horizon)
         self._fails_above_n = fails_above_n
         self.share = float(reward == "progress")
-        """The share of the reward that is for progress."""
+        """Weight of the reward for progress: 1 with `reward="progress"`, else 0; divided among several operations."""
         self._layouts = int(layouts)
         self._first = int(first_trial)
         self._evaluates = starts == "evaluation"
         self._pixels = bool(pixels)
-        self._pool: dict[int, EpisodeStart | Outcome] = {}
+        self._pool: dict[int, EpisodeStart | Outcome] = {}  # trial -> its start, or why it has none
         self._begun: EpisodeStart | None = None
-        self._control: TipControl | None = None
+        self._control: TipControl | None = None  # None until needed; then made from `_begun` and `_actions`
         self._wrist_seed = 0
-        self._actions: list[Action] = []
+        self._actions: list[Action] = []  # the actions of this episode, to repeat them in a copy
         self._over = True
         self._out_of_time = False
-        self._best = 0.0
+        self._best = 0.0  # smallest distance left along the insertion axis, [m]
         self.observation_space = insert_space(self._pixels)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
 
@@ -259,7 +259,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return self._seen(), {}
 
     def _changed(self, settings: EpisodeSettings) -> TrialStarts:
-        """The trials with other settings."""
+        """Return the trials with other settings than those of the environment."""
         return self._usual._replace(
             scene=self._scenes.of(settings.clearance_mm),
             human_error_scale=settings.human_error_scale,
@@ -267,7 +267,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         )
 
     def _begin(self, begun: EpisodeStart) -> None:
-        """Begin an episode."""
+        """Begin an episode or, in `APOAssemble`, its next operation."""
         self._begun = begun
         self._wrist_seed = int(self.np_random.integers(2**63))
         self._actions = []
@@ -297,7 +297,9 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         shared = 0.0
         try:
             self._move(control, given)
+            # the third axis of the reading leads in, so its negative is the distance left
             self._best = min(before, -float(control.reading.tip[2]))
+            # progress as a share of the whole distance; going beyond the target earns nothing more
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
         except ExecutionAborted as aborted:
@@ -319,17 +321,18 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return self._at_work().robot.data
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the simulation, which is made again by the same actions."""
+        """Return the state without the simulation, which a copy rebuilds by repeating the actions."""
         return {**self.__dict__, "_control": None}
 
     def _now(self) -> EpisodeStart:
+        """Return the start of this episode; without one, raise `ResetNeeded`."""
         if self._begun is None:
             raise gymnasium.error.ResetNeeded("there is no episode yet; call reset() first.")
         return self._begun
 
     def _drawn(self) -> EpisodeStart:
-        """A random trial of the pool for training that does not fail before the operation."""
-        pool = self._pool if self._trials is self._usual else {}
+        """Return the start of a random trial of the training pool that does not fail before the operation."""
+        pool = self._pool if self._trials is self._usual else {}  # the pool holds starts with the usual settings only
         why = ""
         for _ in range(MOST_TRIES):
             drawn = self._first + int(self.np_random.integers(self._layouts))
@@ -345,7 +348,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         )
 
     def _start_of(self, number: int) -> EpisodeStart:
-        """The start of a trial, or of the first one of its replacements that does not fail before the operation."""
+        """Return the start of a trial, or of its first replacement that does not fail before the operation."""
+        # only trials for evaluation have replacements
         last = FIRST_TRAINING_TRIAL if number < EVALUATION_STARTS else number + 1
         why = ""
         for replacement in range(number, last, EVALUATION_STARTS):
@@ -356,7 +360,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         raise InputError(f"trial {number} fails before this operation: {why}; use another one, or a lower noise level.")
 
     def _at_work(self) -> TipControl:
-        """The simulation of this episode, which a reset and a copy make again."""
+        """Return the simulation of this episode; after a reset or a copy, make it and repeat the actions so far."""
         begun = self._now()
         if self._control is None:
             rng = np.random.default_rng(self._wrist_seed)
@@ -367,23 +371,35 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return self._control
 
     def _move(self, control: TipControl, action: Action) -> None:
+        """Apply an action for one period: a translation (3) and a rotation (3), scaled to m and rad."""
         control.act(*np.split(self.scale * action[:6].astype(np.float64), 2))
 
     def _end(self, control: TipControl, grip: float) -> dict[str, Any]:
-        """The `info` of the last step, or nothing if the episode goes on."""
+        """Return the `info` of the last step, or an empty dictionary if the episode continues.
+
+        Args:
+            grip: Last number of the action.
+        """
         if control.force_n > self._fails_above_n:
             return self._ended_by("force_stop")
+        # an approach that has arrived opens the hand itself, unless the action keeps it closed
         opens = grip > RELEASE or (self._residual and control.arrived and grip >= -RELEASE)
         self._out_of_time = not opens and len(self._actions) == self._horizon
         return self._done(control, control.let_go()) if opens or self._out_of_time else {}
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
-        """The `info` after the hand opened."""
+        """Return the `info` after the hand opened, with the judge's verdict."""
         begun = self._now()
         verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
         return self._ended_by("ok" if verdict.success else verdict.rests_on.code, why=verdict.rests_on.why)
 
     def _ended_by(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
+        """Return the `info` of an episode that ended with this code.
+
+        Args:
+            part: The part that the code concerns; default: the one that is inserted.
+            why: Reason that is added to the sentence.
+        """
         k = self._now().start.operation
         main = self._trials.scene.scenario.assembly.operations[k].main
         said = describe_outcome(code, part=part or main, operation=k) + (f": {why}" if why else "")
@@ -409,5 +425,5 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
 
 def ended(code: str, sentence: str) -> dict[str, Any]:
-    """The `info` of the last step."""
+    """Return the `info` of the last step: success, outcome code and sentence."""
     return {"success": code == "ok", "is_success": code == "ok", "code": code, "sentence": sentence}

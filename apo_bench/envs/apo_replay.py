@@ -170,6 +170,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._pose_source = pose_source
         self._model = USUAL if noise is None else noise
         self._allowed = max_reobservations
+        # the usual settings, and those of this episode
         self._usual = self._now = EpisodeSettings(
             NoiseLevel(*parse_noise_level(noise_level, pose_source)), human_error_scale, clearance_mm
         )
@@ -181,9 +182,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.observation_space = observation_space(len(self.assembly))
         self.action_space = action_space(len(self.assembly))
         self._episode: Episode | None = None
-        self._aim: Plan | None = None
+        self._aim: Plan | None = None  # replayed by an action of zeros
         self._correction: Correction | None = None
-        self._refused: Outcome | None = None
+        self._refused: Outcome | None = None  # why the next step fails without a replay
         self._over = False
         self._rendering = Rendering(self._scene.scenario.start)
 
@@ -220,6 +221,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._current("there is no trial").trial
 
     def _current(self, missing: str) -> Episode:
+        """Return the episode; without one, raise `ResetNeeded` with a sentence that begins with `missing`."""
         if self._episode is None:
             raise gymnasium.error.ResetNeeded(f"{missing} yet; call reset() first.")
         return self._episode
@@ -238,7 +240,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         number = trial_number(seed, asked)
         self._set(replace_settings(self._usual, asked, self._pose_source))
         super().reset(seed=seed if seed is not None else number)
-        self._over = True
+        self._over = True  # a failing reset leaves no episode to step
         source, scale = self._pose_source, self._now.human_error_scale
         trial, simulated = simulate_trial(self._scene, scale, source, number, self.np_random)
         measured = source == DEPTH_CAMERA
@@ -315,7 +317,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._rendering.close()
 
     def _set(self, now: EpisodeSettings) -> None:
-        """Take the noise and the scene of these settings, or raise an `InputError` and change nothing."""
+        """Apply the settings of an episode; raise `InputError` without any change if one is not allowed."""
         noise = (
             self._usual_noise
             if now.noise_level == self._usual.noise_level
@@ -326,7 +328,12 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._noise = noise
 
     def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, FailurePrediction | None, float | None]:
-        """The verdicts, how the replay ended, its failure prediction and its predicted success."""
+        """Replay a plan unless it is rejected before.
+
+        Returns:
+            The verdicts by key, the outcome, the failure prediction and the predicted success; the last two are None if
+            the demonstration or the correction failed.
+        """
         episode = self._current("there is no trial")
         simulated = episode.simulated
         failed = dict.fromkeys(VERDICTS, False)
@@ -336,7 +343,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             return failed, self._refused, None, None
         robot = self._robot
         predicted = predicted_outcome(plan, self._scene, robot.probe)
-        drawn = robot.robot_error, robot.probe, robot.probe
+        drawn = robot.robot_error, robot.probe, robot.probe  # a robot that probes also searches by a spiral
         predicted_success = predict_success(plan, self.observation, self._correction, self._scene, *drawn)
         if predicted_success < self._min_predicted_success:
             failure = abstain(predicted_success, self._min_predicted_success)

@@ -18,7 +18,7 @@ from apo_bench.judging.verdict import judge
 from apo_bench.records import Criteria, describe_outcome
 from apo_bench.trial.stages import Attempt, SimulatedDemonstration, demonstration_failure, trial_outcome
 
-DO, UNDO, FINISH = range(3)
+DO, UNDO, FINISH = range(3)  # values of `act`
 
 
 @final
@@ -66,15 +66,15 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
     metadata = APOReplay.metadata
 
     def __init__(self, scenario: Any = "stick_in_tower", replay: bool = True, **of_replay: Any) -> None:
-        self._base = APOReplay(scenario, **of_replay)
+        self._base = APOReplay(scenario, **of_replay)  # simulates the episode and judges its replay
         self._replay = replay
         self.render_mode = self._base.render_mode
         n = len(self._base.assembly)
-        self._most = 2 * n * n
+        self._most = 2 * n * n  # acts after which an episode is truncated
         self.observation_space, self.action_space = track_spaces(n)
-        self._placed: Array = np.zeros((0, 4, 4))
+        self._placed: Array = np.zeros((0, 4, 4))  # (n, 4, 4): poses at which operations were done, else observed poses
         self._schedule: list[Step] = []
-        self._step_poses: list[Array] = []
+        self._step_poses: list[Array] = []  # target pose of each step of the schedule
         self._done = self._shown = self._acts = 0
         self._over = True
 
@@ -123,7 +123,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 
     @property
     def schedule(self) -> tuple[Step, ...]:
-        """The steps so far."""
+        """The steps so far, undone operations included."""
         return tuple(self._schedule)
 
     @property
@@ -132,8 +132,8 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         return self._placed.copy()
 
     def action(self, act: TrackingAction) -> dict[str, Any]:
-        """The action that does this act."""
-        goal = self._base.observation.poses[self._done - act.undo]
+        """Return the action, as the action space holds it, for an act of a policy."""
+        goal = self._base.observation.poses[self._done - act.undo]  # the last operation done, or the next one
         twist = np.zeros(6) if act.undo else pose.log(pose.inverse(goal) @ act.target)
         return {"act": UNDO if act.undo else DO, "twist": twist}
 
@@ -146,16 +146,19 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         self._base.close()
 
     def _do(self, undo: bool, twist: Array) -> None:
+        """Undo the last operation, or do the next one with a body twist, (6,), [m, rad]."""
         self._done -= undo
         k = self._done
         if not undo:
             self._placed[k] = self._base.observation.poses[k] @ pose.exp(twist)
             self._done += 1
+            # doing an operation shows the next one
             self._shown = min(max(self._shown, self._done + 1), len(self._placed))
         self._schedule.append(Step(k, undo))
         self._step_poses.append(self._placed[k].copy())
 
     def _judged(self) -> tuple[float, dict[str, Any]]:
+        """Return reward and `info` of the finished episode."""
         if self._done < len(self._placed):
             return _end_info(
                 dict.fromkeys(VERDICTS, False), Outcome("judge", "not_made", self._done, describe_outcome("not_made"))
@@ -165,15 +168,17 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
                 self._placed, self._base.observation, self._base._current("").simulated, self._base._scene.criteria
             )
         self._base.aim(self._placed, self._schedule, np.array(self._step_poses))
+        # zeros replay the aimed plan as it is
         _, reward, _, _, info = self._base.step(np.zeros((len(self._placed), 6)))
         return reward, info
 
     def _mask(self) -> NDArray[np.int8]:
-        """The acts that are possible: none after the end."""
+        """Return which acts are possible: do, undo, finish; none after the end."""
         possible = self._done < self._shown, self._done > 0, True
         return np.array([each and not self._over for each in possible], dtype=np.int8)
 
     def _entries(self) -> Seen:
+        """Return the observation; operations that were not shown have identities and zeros."""
         n = len(self._placed)
         seen: Observation = self._base.observation
         shown = np.arange(n) < self._shown
@@ -192,7 +197,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 def _judged_at(
     goals: Array, seen: Observation, simulated: SimulatedDemonstration, criteria: Criteria
 ) -> tuple[float, dict[str, Any]]:
-    """The verdict on parts that stand exactly at these poses."""
+    """Judge parts that stand exactly at these poses, (n, 4, 4), world, [m]; returns reward and `info`."""
     if simulated.demonstration.code != "ok":
         return _end_info(dict.fromkeys(VERDICTS, False), demonstration_failure(simulated.demonstration))
     reached = reach_exactly(seen, goals)
@@ -202,20 +207,21 @@ def _judged_at(
 
 
 def _end_info(verdicts: dict[str, bool], end: Outcome) -> tuple[float, dict[str, Any]]:
+    """Return reward and final `info` without predictions."""
     return float(verdicts["is_success"]), step_info(verdicts, end, None, None)
 
 
 def follow(env: APOTrack, policy: Policy) -> tuple[float, dict[str, Any]]:
-    """One episode by a policy, from its reset to its end.
+    """Run one episode by a policy, from the state after a reset to its end.
 
     Returns:
         The reward and the last `info`.
     """
-    for _ in env.placed:
+    for _ in env.placed:  # each pass ends with one more operation done
         acts = policy(env.tracked)
         for act in acts:
             env.step(env.action(act))
         if not acts:
-            break
+            break  # a policy that returns no act gives up
     _, reward, _, _, info = env.step({"act": FINISH, "twist": np.zeros(6)})
     return reward, info

@@ -70,7 +70,7 @@ class CorrectPoses(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.util
             self._base.aim(poses, plan.schedule, plan.step_poses, correction)
         else:
             self._base.refuse(correction.status, correction.sentence)
-        self._poses = packed(poses)
+        self._poses = packed(poses)  # corrected poses, (n, 7)
         return self._with_poses(seen), {**info, "correction": correction.status}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:

@@ -1,7 +1,7 @@
-"""An environment of Gymnasium as one of `dm_env`, for agents and wrappers that know that interface.
+"""Adapt an environment of Gymnasium to the interface of `dm_env`, for agents and wrappers that need it.
 
-Needs the package dm-env, which is pure Python itself. The viewer of dm_control and those of its wrappers that ask for
-`physics` also need dm-control, which is imported when `physics` is first used.
+The package dm-env, which is pure Python, must be installed. The viewer of dm_control, and those of its wrappers that
+use `physics`, also need dm-control, which is imported when `physics` is first used.
 """
 
 import copy
@@ -20,22 +20,22 @@ from apo_bench.io import SAFE_PATH, set_environment
 from apo_bench.simulation.scene import copy_data
 
 _STREAM = 0x646D
-"""The stream of `task.random`; no trial uses it."""
+"""Key of the random stream of `task.random`; no trial uses it."""
 
 
 @final
 @dataclass(frozen=True)
 class DmTask:
-    """What wrappers of dm_control ask of a task."""
+    """The attributes of a task that wrappers of dm_control use."""
 
     random: np.random.Generator
 
 
 @final
 class DmAdapter(dm_env.Environment):  # type: ignore[misc]
-    """Steps of Gymnasium as time steps. A step after the last one of an episode resets, as the interface asks.
+    """Steps of Gymnasium as time steps; a step after the last one of an episode resets, as the interface requires.
 
-    Observations are float64 and integer arrays, in a dictionary by name; `info` holds what Gymnasium's `info` held.
+    Observations are arrays in a dictionary by name; `info` holds the `info` of Gymnasium.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], seed: int | None) -> None:
@@ -48,13 +48,13 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
 
     @property
     def physics(self) -> Any:
-        """What the environment shows, a `dm_control.mujoco.Physics`.
+        """The simulation as a `dm_control.mujoco.Physics`.
 
-        It is a copy, with its own model, that every reset and step updates: nothing done to it changes an episode. It
-        holds the truth, so it is not for policies.
+        It is a copy with a model of its own, which every reset and step update, so changes to it do not affect an
+        episode. It holds the truth, so it is not for policies.
 
         Raises:
-            InputError: The package dm-control is not installed, or this environment has no simulation to show.
+            InputError: The package dm-control is not installed, or this environment has no simulation.
         """
         if self._physics is None:
             base = self._env.unwrapped
@@ -68,14 +68,14 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
 
     def reset(self) -> dm_env.TimeStep:
         observation, self.info = self._env.reset(seed=self._seed)
-        self._seed = None  # the first episode alone is that of the seed; the others follow from it
+        self._seed = None  # only the first episode has the given seed; the others follow from it
         self._over = False
         self._update_physics()
         return dm_env.restart(_arrays(observation))
 
     def step(self, action: Any) -> dm_env.TimeStep:
         if self._over:
-            return self.reset()
+            return self.reset()  # the action after the last step is ignored
         observation, reward, terminated, truncated, self.info = self._env.step(np.asarray(action))
         self._over = terminated or truncated
         self._update_physics()
@@ -98,7 +98,11 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
 
 @set_environment({SAFE_PATH: "1"})
 def _physics(data: Any) -> Any:
-    """A copy of `mujoco.MjData` and its model; GLFW, which comes along, starts a Python while it is imported."""
+    """Return a dm_control copy of `mujoco.MjData` and its model.
+
+    GLFW, which dm_control imports, starts a Python process during its import; the environment variable keeps that
+    process from importing modules of the current folder.
+    """
     try:
         from dm_control.mujoco import Physics
         from dm_control.mujoco.wrapper import MjData
@@ -112,6 +116,7 @@ def _physics(data: Any) -> Any:
 
 
 def _spec(space: spaces.Space[Any], name: str) -> Any:
+    """Return the `dm_env` specification of a space; of a `Dict`, one for each entry."""
     if isinstance(space, spaces.Dict):
         return {key: _spec(each, key) for key, each in space.spaces.items()}
     if isinstance(space, spaces.Box):

@@ -1,4 +1,4 @@
-"""One episode of an environment: settings, observation and final `info`."""
+"""Settings, options, trial, observation and final `info` of an episode of an environment."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -16,9 +16,9 @@ from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 MOST_SCENES = 8
-"""Compiled scenes of other clearances that are kept."""
+"""Most compiled scenes of other clearances that are kept."""
 MOST_TRIES = 30
-"""Failed demonstrations in a row after which `reset()` gives up."""
+"""`reset()` gives up after this many failed demonstrations in a row."""
 
 
 @final
@@ -33,7 +33,7 @@ class EpisodeSettings:
     noise_level: NoiseLevel
     human_error_scale: float
     clearance_mm: float | None
-    """Default: the scenario's."""
+    """Clearance per side; None: that of the scenario."""
 
     def __post_init__(self) -> None:
         check("human_error_scale", self.human_error_scale)
@@ -48,10 +48,10 @@ class Episode:
 
     trial: int
     simulated: SimulatedDemonstration
-    """Without its images."""
+    """Its images are dropped to save memory."""
     observation: Observation
     reobserve: Reobservations
-    """None where no reobservation is allowed."""
+    """Observes operations of this trial again."""
 
 
 _OF_TOOLS = frozenset({"lerobot_new_rollout"})
@@ -60,10 +60,10 @@ _OPTIONS = ("trial", *(field.name for field in fields(EpisodeSettings)))
 
 
 def episode_options(options: object) -> dict[str, Any]:
-    """The options of `reset()`, without those that evaluation tools pass to every environment.
+    """Return the options of `reset()` without those of evaluation tools.
 
     Raises:
-        InputError: Not a dict, or an unknown option.
+        InputError: The options are no dict, or one is unknown.
     """
     if options is None:
         return {}
@@ -79,7 +79,7 @@ def episode_options(options: object) -> dict[str, Any]:
 
 
 def trial_number(seed: int | None, asked: Mapping[str, Any]) -> int | None:
-    """The number of the trial, from the seed or the option `trial`; None where neither is given.
+    """Return the number of the trial, from the option `trial` or else the seed; None if neither is given.
 
     Raises:
         InputError: A number that is not allowed.
@@ -94,7 +94,7 @@ def trial_number(seed: int | None, asked: Mapping[str, Any]) -> int | None:
 
 
 def replace_settings(usual: EpisodeSettings, asked: Mapping[str, Any], pose_source: str) -> EpisodeSettings:
-    """The settings of an episode: the usual ones with those that the options change.
+    """Return the settings of an episode: the usual ones, changed by the options.
 
     Raises:
         InputError: A value that is not allowed.
@@ -108,7 +108,13 @@ def replace_settings(usual: EpisodeSettings, asked: Mapping[str, Any], pose_sour
 def simulate_trial(
     scene: Scene, human_error_scale: float, pose_source: str, number: int | None, rng: np.random.Generator
 ) -> tuple[int, SimulatedDemonstration]:
-    """A trial and its demonstration: the one of this number, or else the first of random ones that succeeds.
+    """Simulate the demonstration of a trial.
+
+    Args:
+        number: The trial, whose demonstration may fail; None draws trials until a demonstration succeeds.
+
+    Returns:
+        The number of the trial, and its demonstration.
 
     Raises:
         InputError: `MOST_TRIES` demonstrations in a row failed.
@@ -127,22 +133,23 @@ def simulate_trial(
 
 @final
 class Scenes:
-    """A compiled scene, and the same scene compiled for other clearances."""
+    """Cache of a scene compiled for several clearances."""
 
     def __init__(self, usual: Scene) -> None:
         self._usual = usual
         self._others: dict[float, Scene] = {}
 
     def of(self, clearance_mm: float | None) -> Scene:
-        """The scene of a clearance; default: the scenario's.
+        """Return the scene with a clearance; None: that of the scenario.
 
         Raises:
-            InputError: A part cannot have it.
+            InputError: A part cannot have this clearance.
         """
         usual = self._usual
         clearance = float(usual.scenario.clearance_mm if clearance_mm is None else clearance_mm)
         if clearance == usual.clearance_mm:
             return usual
+        # a scene is taken out and put back, so that the least recently used one comes first
         scene = self._others.pop(clearance, None) or build_scene(
             usual.scenario,
             clearance_mm=clearance,
@@ -162,35 +169,35 @@ VERDICTS = ("is_success", "as_demonstrated", "loose_success")
 
 @final
 class NullableInt(int):
-    """An integer where other environments of a vector may have None: NumPy gathers these into an array of objects."""
+    """An integer in `info` that is None in other environments of a vector; NumPy gathers these as objects."""
 
 
 @final
 class NullableFloat(float):
-    """A number where other environments of a vector may have None."""
+    """A number in `info` that is None in other environments of a vector."""
 
 
 def nullable(x: float | None) -> float | None:
-    """The number in a type that a vector environment can gather together with None."""
+    """Return the number in a type that a vector environment can gather together with None."""
     if x is None:
         return None
     return NullableInt(x) if isinstance(x, int) else NullableFloat(x)
 
 
 def predicted_info(predicted: Mapping[str, Any]) -> dict[str, Any]:
-    """A failure prediction as in a record, for `info`."""
+    """Return a failure prediction for `info`, with the keys of a trial record."""
     return {**predicted, **{name: nullable(predicted[name]) for name in ("operation", "size_mm")}}
 
 
 def verdicts(verdict: Verdict) -> dict[str, bool]:
-    """The verdicts by key."""
+    """Return the three verdicts by their key in `info`."""
     return dict(zip(VERDICTS, (verdict.success, verdict.as_demonstrated, verdict.loose_success), strict=True))
 
 
 def step_info(
     verdicts: Mapping[str, bool], end: Outcome, predicted: FailurePrediction | None, predicted_success: float | None
 ) -> dict[str, Any]:
-    """`info` after the last step."""
+    """Return the `info` of the last step; predictions that are None are left out."""
     return {
         **verdicts,
         "success": verdicts["is_success"],

@@ -1,4 +1,4 @@
-"""The starts of `APOInsert-v0`: trials executed up to where the policy takes over."""
+"""The starts of `APOInsert-v0`: trials, executed up to the moment at which the policy takes over."""
 
 import math
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ from apo_bench.trial.stages import (
 @final
 @dataclass(frozen=True, eq=False)
 class EpisodeStart:
-    """A trial up to where the policy takes over, with its truth."""
+    """A trial at the moment at which the policy takes over, with its truth."""
 
     trial: int
     start: Start
@@ -38,26 +38,27 @@ class EpisodeStart:
     poses: Array
     """(n, 4, 4), the true poses of the operations, world frame, [m]."""
     covariances: Array
-    """(n, 6, 6), stated, of the twist by which each part may be wrong at its goal, in its own frame, [m, rad]."""
+    """(n, 6, 6), stated covariance of the twist error of each part at its target, in the part's frame, [m, rad]."""
 
     @property
     def reference(self) -> Array:
-        """(k + 1, 4, 4), the true poses up to this operation, world frame, [m]."""
+        """The true poses of the operations up to this one, (k + 1, 4, 4), world, [m]."""
         return self.poses[: self.start.operation + 1]
 
     @property
     def covariance(self) -> Array:
-        """(6, 6), that of this operation."""
+        """The stated covariance of this operation, (6, 6)."""
         return np.asarray(self.covariances[self.start.operation])
 
     def off(self, control: TipControl) -> Array:
-        """The error of the part relative to its neighbours as they stand now; as `TipControl.off`."""
+        """Return the error of the part relative to its neighbours where they stand now, as `TipControl.off` does."""
         assembly = self.plan.assembly
         k = self.start.operation
         operation = assembly.operations[k]
         true = compute_placements(assembly, self.plan.start, self.poses)[k]
         now = control.poses()
-        # Where a part in the hand, the main one or one that it carries, belongs beside a part that stands.
+        # for each pair of held part and standing part: where the held part belongs, as a displacement from
+        # its present pose
         pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
         wanted = [
             now[there] @ pose.inverse(true[there]) @ true[held] @ pose.inverse(now[held]) for held, there in pairs
@@ -66,7 +67,7 @@ class EpisodeStart:
 
 
 class TrialStarts(NamedTuple):
-    """What determines a start besides the number of its trial."""
+    """The settings that determine a start, except the number of the trial."""
 
     scene: Scene
     operation: int
@@ -76,7 +77,11 @@ class TrialStarts(NamedTuple):
     robot: RobotSettings
 
     def begin(self, trial: int) -> EpisodeStart | Outcome:
-        """Demonstrate, observe, correct, and execute the operations before; or the failure on the way there."""
+        """Demonstrate, observe, correct, and execute the operations before this one.
+
+        Returns:
+            The start, or the outcome that ended the trial before it.
+        """
         scene, k, human_error_scale, noise, corrector, robot = self
         simulated = simulate_demonstration(scene, human_error_scale, trial)
         if simulated.demonstration.code != "ok":
@@ -91,6 +96,7 @@ class TrialStarts(NamedTuple):
         start = prepare_start(made.plan, scene, k, replace(config, time_limit_s=math.inf), sensor)
         if isinstance(start, Outcome):
             return start
+        # without an operation before there is nothing to judge
         before = judged(scene, start.after, start.after[-1], simulated.layout.poses[:k]) if k else None
         if before is not None and not before.success:
             code = before.rests_on.code
@@ -105,7 +111,7 @@ class TrialStarts(NamedTuple):
         )
 
     def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:
-        """The start of the next operation after one is done; or the failure on the way there."""
+        """Return the start of the next operation after one is done, or the outcome that ended the trial before it."""
         key = (*stream_key(begun.trial, WRENCH), 1 + len(begun.reference))
         start = prepare_next_start(
             begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.ft_sensor, key)
@@ -114,20 +120,25 @@ class TrialStarts(NamedTuple):
 
 
 def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | None, reference: Array) -> Verdict:
-    """The judge's verdict on the first operations alone.
+    """Judge the first k operations alone.
 
     Args:
-        after: After each of them.
-        reference: (k, 4, 4), their true poses, world frame, [m].
+        after: Snapshot after each of them.
+        final: Snapshot at the end.
+        reference: Their true poses, (k, 4, 4), world, [m].
     """
     return judge(scene.scenario.assembly.first(len(after)), ReachedState(after, final), reference, scene.criteria)
 
 
 def _stated(seen: Observation, correction: Correction | None, assumed: str | None) -> Array:
-    """The covariance that the corrector leaves, and that of the assumed robot error without its joints, (n, 6, 6)."""
+    """Return stated covariances, (n, 6, 6): those of the correction, plus the assumed robot error without its joints.
+
+    Args:
+        assumed: The robot error as in `parse_robot_error`; None if it is unknown, which adds nothing.
+    """
     posterior = None if correction is None else correction.covariance
     covariance = seen.covariance if posterior is None else posterior
     sigmas = parse_robot_error(assumed or NO_ROBOT_ERROR)
-    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])
+    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])  # independent errors add as squares
     deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])
     return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))

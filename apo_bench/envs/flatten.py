@@ -41,7 +41,7 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         self.observation_space = self._seen = spaces.Box(
             seen.low.astype(np.float32), seen.high.astype(np.float32), dtype=np.float32
         )
-        self._size = sum(map(_size, _parts(env.action_space).values()))
+        self._size = sum(map(_size, _parts(env.action_space).values()))  # numbers of a flat action
         self.action_space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Flat, dict[str, Any]]:
@@ -62,10 +62,12 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         return self._flat(seen), float(reward), terminated, truncated, info
 
     def _flat(self, seen: Any) -> Flat:
+        """Return the flat observation; clipping removes rounding beyond the bounds."""
         flat: Any = spaces.flatten(self.env.observation_space, seen)
         return np.clip(flat, self._seen.low, self._seen.high).astype(np.float32)
 
     def _action(self, given: Flat) -> Any:
+        """Convert a flat action to one of the environment."""
         made: dict[str, Any] = {}
         for name, part in _parts(self.env.action_space).items():
             numbers, given = np.split(given, [_size(part)])
@@ -74,7 +76,11 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
 
 
 def _parts(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """The parts of an action space by name."""
+    """Return the parts of an action space by name; a `Box` alone has the name "".
+
+    Raises:
+        InputError: A part is neither a `Box` nor a `Discrete`.
+    """
     parts = dict(space.spaces) if isinstance(space, spaces.Dict) else {"": space}
     if not all(isinstance(part, spaces.Box | spaces.Discrete) for part in parts.values()):
         raise InputError(f"an environment with actions {space} was given; only Box and Discrete can be flattened.")
@@ -82,10 +88,11 @@ def _parts(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
 
 
 def _size(part: spaces.Space[Any]) -> int:
+    # a Discrete with n values is n numbers, the largest of which counts
     return int(part.n) if isinstance(part, spaces.Discrete) else int(np.prod(part.shape or ()))
 
 
 def _scale(part: Any, numbers: Flat) -> Any:
-    """Numbers from -1 to 1 within the bounds of a `Box`."""
+    """Scale numbers from -1 to 1 linearly to the bounds of a `Box`."""
     share = 0.5 * (1.0 + numbers.reshape(part.shape).astype(np.float64))
     return (part.low + share * (part.high - part.low)).astype(part.dtype)

@@ -1,4 +1,4 @@
-"""Policies of `APOInsert-v0`, functions of the environment and what is seen, and the environment that they act in."""
+"""Policies of `APOInsert-v0`: functions of environment and observation, and the environment they act in."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -18,24 +18,25 @@ POLICIES: Mapping[str, str] = MappingProxyType(
         "straight": "apo_bench.envs.policies:straight",
     }
 )
-"""By name; one that remembers is a class, of which each episode makes one."""
+"""Name -> import path; a policy that keeps a state is a class, and each episode makes an instance of it."""
 _GAIN = 0.5
-"""Of what it is off, so much is made up for with each action."""
+"""Share of the remaining error that one action corrects."""
 
 
 def straight(env: APOInsert, seen: dict[str, Any]) -> Array:
-    """The approach alone."""
+    """Add nothing to the scripted approach."""
     return np.zeros(7)
 
 
 def expert(env: APOInsert, seen: dict[str, Any]) -> Array:
-    """A teacher that sees where part and neighbours really are: goes where the part has to go, across and turned."""
+    """Act as a teacher that knows the true error of the part: correct its translation and rotation across the axis."""
+    # the third number, along the axis, is left to the approach
     aside = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0]) * env.off / env.scale
     return np.append(np.clip(-_GAIN * aside, -1.0, 1.0), 0.0)
 
 
 def insert_env(settings: TrialConfig) -> APOInsert:
-    """The environment of such trials, made by Gymnasium; without a robot error, with its usual one.
+    """Make the environment for trials with these settings; without a robot error it has its default one.
 
     Raises:
         InputError: A setting that the environment does not take.

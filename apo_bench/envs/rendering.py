@@ -1,4 +1,4 @@
-"""Pictures and windows of an episode."""
+"""Images, films and windows of an episode."""
 
 from typing import Any, final
 
@@ -9,30 +9,29 @@ from apo_bench.geometry import Array
 from apo_bench.simulation.scene import Scene
 
 MODES = ("rgb_array", "rgb_array_list", "human")
-FPS = 25
+FPS = 25  # frames per second of a film
 FILM_SPEED = 4.0
-"""A film is shown so many times as fast as the replay was."""
-_PICTURE = (640, 480)
-_SMALL = (320, 240)
-"""Width and height of a picture, and of one of a film."""
+"""Playback speed of a film relative to the replay."""
+_PICTURE = (640, 480)  # width and height of an image, in pixels
+_SMALL = (320, 240)  # width and height of a frame of a film, in pixels
 
 
 @final
 class Rendering:
-    """What there is to show; nothing is kept that the mode does not ask for."""
+    """The images of an episode; nothing is recorded that the render mode does not need."""
 
     def __init__(self, poses: Poses) -> None:
         self.begin(poses)
         self.window: Any = None
 
     def begin(self, poses: Poses) -> None:
-        """Parts stand like this before the step."""
+        """Start an episode with the parts at these poses."""
         self.poses = poses
-        self.state: Array | None = None
+        self.state: Array | None = None  # joint positions at the end of the replay
         self._frames: list[Any] = []
 
     def watch(self, scene: Scene, mode: str | None) -> Any:
-        """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
+        """Return the callback for a replay; in mode `human` a new window, since every replay has its own data."""
         if mode == "human":
             from apo_bench.simulation.scene.render import ReplayWindow
 
@@ -47,7 +46,7 @@ class Rendering:
         return self._remember if mode == "rgb_array" else self.window
 
     def shown(self, scene: Scene, mode: str | None) -> Any:
-        """As `APOReplay.render`."""
+        """Return the images, as `APOReplay.render` does."""
         if mode in (None, "human"):
             return None
         from apo_bench.simulation.scene.render import picture_with_arm
@@ -63,8 +62,9 @@ class Rendering:
             self.window = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the window."""
+        """Return the state without the window, which cannot be copied."""
         return {**self.__dict__, "poses": dict(self.poses), "window": None}
 
     def _remember(self, data: Any) -> None:
+        """Keep the joint positions; the last call of a replay leaves those at its end."""
         self.state = np.array(data.qpos)

@@ -1,4 +1,4 @@
-"""The robot of an environment: its errors, its probing, and its replay."""
+"""The robot of an environment: its errors, its probing, and the execution of a plan."""
 
 from typing import Any, NamedTuple
 
@@ -16,11 +16,11 @@ from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import WRENCH, Attempt, draw_robot_error, replay_and_judge, stream_key
 
 LONGEST_REPLAY_S = 1000.0
-"""Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
+"""Simulated time after which a replay starts no further step: seven times the longest replay of the benchmark."""
 
 
 class RobotSettings(NamedTuple):
-    """The arguments of an environment with these names."""
+    """The arguments of an environment that concern the robot."""
 
     robot_error: str
     probe: bool
@@ -28,7 +28,7 @@ class RobotSettings(NamedTuple):
     assumed_robot_error: str
 
     def checked(self) -> "RobotSettings":
-        """The same in their canonical spelling.
+        """Return the settings in canonical spelling.
 
         Raises:
             InputError: An unknown name, or a number that is not allowed.
@@ -46,7 +46,7 @@ class RobotSettings(NamedTuple):
         return parse_assumed_error(self.assumed_robot_error, self.robot_error)
 
     def execution(self, plan: Plan, scene: Scene, trial: int, fidelity: str = "full") -> ExecutionConfig:
-        """How it executes a plan in a trial, which determines its errors and the noise of its sensor."""
+        """Return the execution settings of a trial, whose number determines robot errors and sensor noise."""
         probing = probing_config(plan, scene, self.assumed, stream_key(trial, WRENCH), self.ft_sensor)
         return ExecutionConfig(
             fidelity,
@@ -60,12 +60,12 @@ class RobotSettings(NamedTuple):
 def execute_plan(
     robot: RobotSettings, plan: Plan, scene: Scene, reference: Array, trial: int, watch: Any, fidelity: str
 ) -> Attempt:
-    """One replay by this robot, and the verdict on it.
+    """Replay a plan once with this robot, and judge the result.
 
     Args:
-        reference: As in `replay_and_judge`.
+        reference: True poses, as in `replay_and_judge`.
         trial: Number of the trial, which determines the robot's errors and the noise of its sensor.
-        watch: As in `replay_and_judge`.
+        watch: Callbacks, as in `replay_and_judge`.
         fidelity: As in `ExecutionConfig`.
     """
     return replay_and_judge(plan, scene, reference, watch, robot.execution(plan, scene, trial, fidelity))

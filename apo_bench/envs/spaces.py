@@ -1,6 +1,6 @@
-"""Observation and action space of `APOReplay-v0`.
+"""Observation and action spaces of the environments, and the observations themselves.
 
-What a learner sees of one operation, and the space that it is in: `docs/guide/insertion.md` has every number.
+The guide on insertion explains every number of the observations of `APOInsert-v0`.
 """
 
 import math
@@ -17,22 +17,22 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 ROOM_M = 2.0
-"""Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
+"""Bound of observed positions per axis, [m]; the position of a gross outlier is clipped to it."""
 LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
-"""No stated standard deviation is larger, [m, rad]."""
+"""Bound of stated standard deviations per axis, [m, rad]."""
 _LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
-"""How far an action can move a goal per axis, [m, rad]."""
+"""Bound of the displacement by an action, per axis, [m, rad]."""
 _FAR = np.repeat([ROOM_M, 1.0], [3, 4])
-"""Of a packed pose, (7,); of a quaternion, rounding alone could be beyond."""
+"""Bounds of a packed pose, (7,); clipping also removes rounding of quaternions beyond 1."""
 
 Action = NDArray[np.float64]
 Seen = dict[str, Any]
 
 
 def observation_space(n: int) -> spaces.Dict:
-    """The observations of `n` operations."""
+    """Return the observation space of `APOReplay-v0` for n operations."""
     far = np.tile(_FAR, (n, 1))
-    unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
+    unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))  # bounds of covariances
     return spaces.Dict(
         {
             "poses": spaces.Box(-far, far, dtype=np.float64),
@@ -43,13 +43,13 @@ def observation_space(n: int) -> spaces.Dict:
 
 
 def action_space(n: int) -> spaces.Space[Action]:
-    """A body twist for each of `n` operations."""
+    """Return the action space of `APOReplay-v0`: a body twist for each of n operations."""
     twist = np.tile(_LARGEST_TWIST, (n, 1))
     return spaces.Box(-twist, twist, dtype=np.float64)
 
 
 def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
-    """What is seen and done by who follows a human through `n` operations."""
+    """Return observation and action space of `APOTrack-v0` for n operations."""
     seen = observation_space(n)
     several = spaces.MultiBinary(n)
     twist = spaces.Box(-_LARGEST_TWIST, _LARGEST_TWIST, dtype=np.float64)
@@ -60,7 +60,7 @@ def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
 
 
 def observation_entries(observation: Observation) -> Seen:
-    """Fresh copies of what was seen."""
+    """Return an observation as a dictionary of new arrays in `observation_space`."""
     return {
         "poses": packed(observation.poses),
         "covariance": observation.covariance.copy(),
@@ -69,12 +69,16 @@ def observation_entries(observation: Observation) -> Seen:
 
 
 def packed(goals: Array) -> Array:
-    """Goals (n, 4, 4) as observations hold them, (n, 7), within the bounds of their space."""
+    """Convert poses (n, 4, 4) to (n, 7), clipped to the bounds of the observation space."""
     return np.clip(pose.pack(goals), -_FAR, _FAR)
 
 
 def moved(plan: Plan, action: Action, space: spaces.Space[Action]) -> Plan:
-    """Every goal and every target of an operation with the displacement of that operation on its right.
+    """Return the plan with every target pose and step pose multiplied from the right by exp(twist) of its operation.
+
+    Args:
+        action: Body twists, (n, 6), [m, rad].
+        space: The action space that limits them.
 
     Raises:
         InputError: The action is not in the action space.
@@ -87,25 +91,25 @@ def moved(plan: Plan, action: Action, space: spaces.Space[Action]) -> Plan:
             "allowed, as `env.action_space` says."
         )
     displacements = pose.exp(twist)
-    done = [step.operation for step in plan.schedule]
+    done = [step.operation for step in plan.schedule]  # operation of each step
     return replace(
         plan, target_poses=plan.target_poses @ displacements, step_poses=plan.step_poses @ displacements[done]
     )
 
 
-MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)
-PIXELS = 96
-_FAR_MM_DEG = np.repeat([500.0, 180.0], 3)
+MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)  # converts a twist from [m, rad] to [mm, deg]
+PIXELS = 96  # width and height of images
+_FAR_MM_DEG = np.repeat([500.0, 180.0], 3)  # bounds of a tip error
 _SEEN = {
     "agent_pos": np.array([*_FAR_MM_DEG, *_FAR_MM_DEG, 100.0]),
     "wrench": np.repeat([1000.0, 1000.0], 3),
     "plan": np.array([1.0, 1.0, 1.0, 500.0, 500.0, 1e4, *_FAR_MM_DEG, *np.ones(7)]),
 }
-"""No number that is seen is larger."""
+"""Name -> bound of each number of the observations of `APOInsert-v0`."""
 
 
 def insert_space(pixels: bool) -> spaces.Dict:
-    """The space of what is seen."""
+    """Return the observation space of `APOInsert-v0`, with or without images."""
     seen: dict[str, spaces.Space[Any]] = {
         name: spaces.Box(-most.astype(np.float32), most.astype(np.float32), dtype=np.float32)
         for name, most in _SEEN.items()
@@ -118,15 +122,16 @@ def insert_space(pixels: bool) -> spaces.Dict:
 def insert_observation(
     control: TipControl, covariance: Array, best: float, left: int, action: NDArray[np.float32]
 ) -> dict[str, Any]:
-    """What is seen now, but for pictures.
+    """Return the present observation without images.
 
     Args:
-        covariance: (6, 6), stated, of the twist of the part, [m, rad].
-        best: The least that was left of the way in so far, [m].
-        left: How many actions are left.
-        action: (7,), the last one.
+        covariance: Stated covariance of the twist error of the part, (6, 6), [m, rad].
+        best: Smallest distance left along the insertion axis so far, [m].
+        left: Number of actions left.
+        action: The last action, (7,).
     """
     feel = control.reading
+    # distance left [mm], smallest so far [mm], time left [s]
     way = (-1e3 * float(feel.tip[2]), 1e3 * best, PERIOD_S * left)
     seen: dict[str, Any] = {
         "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],

@@ -1,4 +1,4 @@
-"""Files, tables, streams and processes."""
+"""Safe reading and writing of files, tables, streams and processes."""
 
 from apo_bench.io.csv_tables import Columns, CsvRow, check_separator, read_csv, write_csv
 from apo_bench.io.documents import (

@@ -1,4 +1,4 @@
-"""Tables of comma-separated values."""
+"""Read and write tables of comma-separated values."""
 
 import csv
 import io
@@ -13,13 +13,13 @@ from apo_bench.io.result_files import write_file
 from apo_bench.io.safe_io import read_text
 
 Columns = Mapping[str, tuple[str, float]]
-"""Name of a column -> what it stands for, and the size of its unit."""
+"""Name of a column -> its meaning, and the factor that converts its unit."""
 _SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
-"""What spreadsheets of some countries put in place of commas."""
+"""Separators that spreadsheets of some countries write instead of commas -> their name in messages."""
 
 
 class CsvCell(NamedTuple):
-    """One cell."""
+    """A cell of a table, with its column and the unit of the column."""
 
     column: str
     text: str
@@ -29,14 +29,14 @@ class CsvCell(NamedTuple):
 @final
 @dataclass(frozen=True)
 class CsvRow:
-    """One row, its cells by what they stand for."""
+    """A row of a table: meaning of a column -> cell."""
 
     file: str
     line: int
     cells: Mapping[str, CsvCell]
 
     def require(self, holds: object, meaning: str, wanted: str) -> None:
-        """Raise the `InputError` that says what is needed in a cell, and what was given, unless something holds."""
+        """Raise an `InputError` that states what a cell needs and what it has, unless a condition holds."""
         if not holds:
             cell = self.cells[meaning]
             given = f"'{cell.text[:40]}' was given" if cell.text else "nothing was given"
@@ -47,7 +47,7 @@ class CsvRow:
         return self.cells[meaning].text if meaning in self.cells else ""
 
     def number(self, meaning: str, largest: float) -> float:
-        """Return a finite number, in the unit that the size of the column's own unit is counted in."""
+        """Return a finite number of at most this size, converted by the unit of its column."""
         _, text, unit = self.cells[meaning]
         try:
             x = float(text) * unit
@@ -59,14 +59,16 @@ class CsvRow:
 
 
 def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Iterator[CsvRow]:
-    """Read every row that is not empty, behind the first, which names the columns.
+    """Yield every row that is not empty; the first one names the columns.
 
     Args:
-        columns: All that are allowed.
-        required: What some column has to stand for.
+        columns: All allowed columns.
+        required: Meanings that some column must have.
 
     Raises:
-        InputError: No such file, too large, not UTF-8, not CSV, unknown, repeated or missing columns, ragged rows.
+        InputError: There is no such file, it is too large, not UTF-8 or not CSV, columns are unknown, repeated or
+        missing,
+            or a row has another number of cells.
     """
     reader = csv.reader(io.StringIO(read_text(path, "CSV file"), newline=""), strict=True, skipinitialspace=True)
     try:
@@ -86,7 +88,7 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
 
 
 def _check_header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> None:
-    """Check that every column is known, that none stands for the same as another one, and that none is missing."""
+    """Check that every column is known, that no two have the same meaning, and that none is missing."""
     check_separator(place, names)
     for name in names:
         require_known("column", name, columns, place=place)
@@ -99,7 +101,7 @@ def _check_header(place: str, names: Sequence[str], columns: Columns, required: 
 
 
 def check_separator(place: str, names: Sequence[str]) -> None:
-    """Refuse names of columns that are separated otherwise than by commas."""
+    """Raise an `InputError` if the columns of a header are not separated by commas."""
     for separator, called in _SEPARATORS.items():
         require(
             len(names) != 1 or separator not in names[0],
@@ -108,7 +110,7 @@ def check_separator(place: str, names: Sequence[str]) -> None:
 
 
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a table; None is an empty field, and numbers stay numbers.
+    """Write a table; None becomes an empty field.
 
     Raises:
         InputError: As `replace_file`.

@@ -1,4 +1,4 @@
-"""TOML and JSON files as msgspec types."""
+"""Read TOML and JSON files into msgspec types, with errors that state the place and what is needed."""
 
 import json
 import re
@@ -16,19 +16,20 @@ from apo_bench.io.safe_io import LARGEST_BYTES, read_text
 from apo_bench.io.safe_text import UNSHOWN
 
 Finite = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
-"""Neither infinite nor NaN."""
+"""A number that is neither infinite nor NaN."""
 Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e300)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0.0, le=1e300)]
 Triple = tuple[Finite, Finite, Finite]
 Quadruple = tuple[Finite, Finite, Finite, Finite]
 Text = Annotated[str, msgspec.Meta(pattern=f"^(?:(?!{UNSHOWN.pattern})(?s:.)|[\n\t])*$")]
-"""Without control characters."""
+"""A text without control characters."""
 Syntax = Literal["toml", "json"]
-_LONGEST_VALUE = 60
+_LONGEST_VALUE = 60  # letters of a value in a message
+# message of msgspec, and the path in the document that may follow it
 _PATH = re.compile(r"(.*?)(?: - at `\$(.*)`)?", re.DOTALL)
-_STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]")
-_ENTRY = re.compile(r"((?<!i)s)?\[(\d+)\]")
-_WORDS = {
+_STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]")  # a step of such a path: a key, or an index of a list
+_ENTRY = re.compile(r"((?<!i)s)?\[(\d+)\]")  # an index, after the plural `s` of a key, which is dropped
+_WORDS = {  # type in a message of msgspec, or kind of JSON value -> words
     "float": "a number",
     "int": "a whole number",
     "str": "a text in quotes",
@@ -43,7 +44,7 @@ _WORDS = {
 
 
 class FileTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A table of a file: its fields are the keys that it may have, those without a default the ones it must have."""
+    """A table of a file: its fields are the allowed keys; those without a default are required."""
 
 
 T = TypeVar("T")
@@ -57,28 +58,28 @@ def read_typed(
     syntax: Syntax = "toml",
     limit: int = LARGEST_BYTES,
 ) -> T:
-    """The document in a file, as a type.
+    """Read a file into a type.
 
     Args:
         kind: What the file should be, for the message: `sweep file`.
-        limit: Bytes.
+        limit: Largest size in bytes.
 
     Raises:
-        InputError: No such file, too large, not UTF-8, another syntax, or something that the type does not allow.
+        InputError: There is no such file, it is too large, not UTF-8, of another syntax, or not of the type.
     """
     return convert_typed(read_plain(path, kind, syntax=syntax, limit=limit), wanted, str(path))
 
 
 def read_plain(path: str | Path, kind: str, *, syntax: Syntax = "toml", limit: int = LARGEST_BYTES) -> Any:
-    """The document in a file as dicts, lists, texts and numbers; see `read_typed`."""
+    """Read a file into dicts, lists, texts and numbers; arguments as in `read_typed`."""
     return parse_plain(read_text(path, f"{kind} (.{syntax})", limit), str(path), syntax)
 
 
 def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
-    """The document in a text; `file` is its name in messages.
+    """Parse a text into dicts, lists, texts and numbers; `file` is its name in messages.
 
     Raises:
-        InputError: It has another syntax.
+        InputError: The text has another syntax.
     """
     decode = msgspec.toml.decode if syntax == "toml" else msgspec.json.decode
     try:
@@ -88,13 +89,13 @@ def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
 
 
 def convert_typed(value: Any, wanted: type[T], place: str) -> T:
-    """A part of a document as a type.
+    """Convert a part of a document to a type.
 
     Args:
-        place: Where it stands, for the message: file and key.
+        place: File and key of the part, for the message.
 
     Raises:
-        InputError: The type does not allow it.
+        InputError: The type does not allow the value.
     """
     try:
         return msgspec.convert(value, wanted)
@@ -103,11 +104,12 @@ def convert_typed(value: Any, wanted: type[T], place: str) -> T:
 
 
 def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
-    """What msgspec says, with the place in words: `mine.toml, operation 2, goal: a list is needed, 3 was given.`"""
+    """Return a message of msgspec as a sentence: `mine.toml, operation 2, goal: a list is needed, 3 was given.`."""
     match = _PATH.fullmatch(said)
     assert match is not None
     fault, named = match[1], match[2] or ""
-    path = named.partition("[...]")[0]
+    path = named.partition("[...]")[0]  # up to the first unknown index
+    # find the value that the message is about
     for key, entry in _STEP.findall(path):
         value = value[key] if key else value[int(entry)]
     at = place + _ENTRY.sub(lambda found: f" {int(found[2]) + 1}", re.sub(r"^\[", ".entry[", path)).replace(".", ", ")
@@ -124,7 +126,7 @@ def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
 
 
 def _needed(fault: str, key: str, wanted: Any) -> str:
-    """What a type allows, in words."""
+    """Return what a type allows, in words."""
     if fault.startswith("Invalid"):
         return " or ".join(map(show_value, _choices(wanted, key)))
     if "matching regex" in fault:
@@ -133,11 +135,11 @@ def _needed(fault: str, key: str, wanted: Any) -> str:
     needed = re.sub(
         r"`(.*?)`", lambda found: " or ".join(_WORDS.get(kind, kind) for kind in found[1].split(" | ")), needed
     )
-    return re.sub(r"a number [<>]= -?1e\+300|Number out of range", "a finite number", needed)
+    return re.sub(r"a number [<>]= -?1e\+300|Number out of range", "a finite number", needed)  # the bounds of `Finite`
 
 
 def _tables(wanted: Any) -> Iterator[type[msgspec.Struct]]:
-    """All tables that a type is made of."""
+    """Yield all tables that a type contains."""
     inside = get_args(wanted)
     if isinstance(wanted, type) and issubclass(wanted, msgspec.Struct):
         yield wanted
@@ -147,7 +149,7 @@ def _tables(wanted: Any) -> Iterator[type[msgspec.Struct]]:
 
 
 def _choices(wanted: Any, key: str) -> Iterator[Any]:
-    """The values that a key of some table may have, where these are few."""
+    """Yield the values that a key of some table may have, if it is a tag or a `Literal`."""
     for table in _tables(wanted):
         if table.__struct_config__.tag_field == key:
             yield table.__struct_config__.tag
@@ -158,16 +160,16 @@ def _choices(wanted: Any, key: str) -> Iterator[Any]:
 
 
 def show_value(value: Any) -> str:
-    """A value of a document for a sentence."""
+    """Return a value of a document for a sentence, shortened."""
     text = one_line(json.dumps(value, ensure_ascii=False, default=str), _LONGEST_VALUE)
     return text if len(text) < _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
 
 
 def check_quaternion(q: Quadruple, place: str) -> Array:
-    """Four numbers, (4,).
+    """Return a quaternion as an array, (4,).
 
     Raises:
-        InputError: They are not of length 1.
+        InputError: Its length is not 1.
     """
     holds = abs(np.linalg.norm(q) - 1.0) <= 1e-3
     require(holds, f"{place}: a quaternion of length 1 (within 0.001) is needed, {show_value(list(q))} was given.")

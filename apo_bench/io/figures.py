@@ -1,4 +1,4 @@
-"""Figures of matplotlib with its default settings."""
+"""Draw and save figures with matplotlib's default settings, whatever the user's are."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,10 +11,10 @@ from apo_bench.io.result_files import replace_file
 
 @contextmanager
 def use_figure_style(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
-    """Matplotlib with its own settings, and with these, while something is drawn; those of before come back.
+    """Draw with matplotlib's defaults and these settings; the user's settings are restored afterwards.
 
-    Text is drawn letter by letter: `$` in the name of a method begins no formula. A function that draws has this as a
-    decorator or around its body, and imports what it needs of matplotlib inside.
+    Text is drawn literally: `$` in the name of a method begins no formula. Use it as a decorator or around the body of
+    a function that draws, and import matplotlib's modules inside.
     """
     matplotlib: Any = import_module("matplotlib")
     with matplotlib.rc_context():
@@ -25,7 +25,7 @@ def use_figure_style(settings: Mapping[str, Any] | None = None) -> Iterator[Any]
 
 
 def save_figure(figure: Any, out: str | Path, *, dpi: int = 100) -> None:
-    """Write a figure of matplotlib, as SVG if the file is called so, else as PNG; without date and version.
+    """Write a figure of matplotlib, as SVG if the name ends in `.svg`, else as PNG; without date and version.
 
     Raises:
         InputError: As `replace_file`.

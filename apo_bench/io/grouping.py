@@ -8,7 +8,7 @@ V = TypeVar("V")
 
 
 def group_by(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Group values by their keys; both keep the order in which they came."""
+    """Group values by their keys; keys and values keep their order."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)

@@ -1,4 +1,4 @@
-"""The files that an MJCF file is made of."""
+"""Find the files that an MJCF file consists of."""
 
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
@@ -7,18 +7,18 @@ from xml.etree import ElementTree
 from apo_bench.errors import InputError
 from apo_bench.io.safe_io import read_bytes
 
-_FOLDERS = ("meshdir", "texturedir", "assetdir")
+_FOLDERS = ("meshdir", "texturedir", "assetdir")  # attributes that name folders of files
 _MODELS = ("include", "model")
-"""Elements whose file is MJCF again."""
+"""Elements whose file is MJCF too."""
 _LARGEST_BYTES = 100_000_000
 
 
 def list_named_files(mjcf: Path) -> tuple[Path, ...]:
-    """An MJCF file and every file that it names, as far as they are there, in the order in which they are named.
+    """Return an MJCF file and all existing files that it names, in the order in which they are named.
 
-    MuJoCo looks for a file in one folder only; a file of that name in another stated folder counts as well.
+    MuJoCo searches one folder only; here a file of that name in any other stated folder counts as well.
     """
-    models = {mjcf.resolve(): mjcf}
+    models = {mjcf.resolve(): mjcf}  # resolved path -> path, of MJCF files
     folders = {mjcf.parent: None}
     names: dict[str, None] = {}
     todo = [mjcf]
@@ -35,13 +35,13 @@ def list_named_files(mjcf: Path) -> tuple[Path, ...]:
                 if file.resolve() not in models:
                     models[file.resolve()] = file
                     todo.append(file)
-    # With strippath only the last part of a name counts.
+    # with MuJoCo's option strippath only the last part of a name counts
     both = (each for name in names for each in (name, PurePosixPath(name).name))
     return tuple(dict.fromkeys([*models.values(), *_found(both, folders)]))
 
 
 def _elements(model: Path) -> Iterable[ElementTree.Element]:
-    """All elements of a file; none of one that cannot be read, which its reader refuses."""
+    """Return all elements of an MJCF file; none of an unreadable file, which MuJoCo reports."""
     try:
         return ElementTree.fromstring(read_bytes(model, "MJCF file", _LARGEST_BYTES)).iter()
     except (ElementTree.ParseError, InputError, ValueError):
@@ -49,5 +49,6 @@ def _elements(model: Path) -> Iterable[ElementTree.Element]:
 
 
 def _found(names: Iterable[str], folders: Iterable[Path]) -> list[Path]:
+    """Return the existing files of these names in these folders."""
     places = tuple(folders)
     return [place / name for name in names for place in places if name and (place / name).is_file()]

@@ -1,4 +1,4 @@
-"""Write a table as Parquet with pyarrow."""
+"""Write tables as Parquet files with pyarrow."""
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
@@ -11,17 +11,17 @@ from apo_bench.io.result_files import replace_file
 
 
 def has_parquet() -> bool:
-    """Whether tables can be written as Parquet: pyarrow is installed."""
+    """Return whether pyarrow is installed, so that tables can be written as Parquet."""
     return find_spec("pyarrow") is not None
 
 
 def write_columns(
     names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path, kinds: Mapping[str, str] = MappingProxyType({})
 ) -> None:
-    """Write columns as Parquet; lists of a column are lists there, and a column without any value is one of numbers.
+    """Write columns as Parquet; a column without any value becomes a column of numbers.
 
     Args:
-        kinds: What columns are that may have no value: text, whole, numbers or wholes, the last two of lists.
+        kinds: Column that may have no value -> its type: `text`, `whole`, or lists, `numbers` or `wholes`.
 
     Raises:
         InputError: The package pyarrow is not installed, or as `replace_file`.
@@ -40,6 +40,6 @@ def write_columns(
     }
     types = [of_kind[kinds[name]] if name in kinds else None for name in names]
     arrays = [pa.array(column, kind, from_pandas=False) for column, kind in zip(columns, types, strict=True)]
-    arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
+    arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]  # without any value
     with replace_file(path) as out:
         parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")

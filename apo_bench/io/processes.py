@@ -1,16 +1,16 @@
-"""Environment variables for subprocesses that the package starts."""
+"""Set environment variables for processes that the package starts."""
 
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 SAFE_PATH = "PYTHONSAFEPATH"
-"""Without it, `python -c` looks for Python's own modules in the current folder, and so do processes of a pool."""
+"""Without this variable, `python -c` and processes of a pool would import modules of the current folder."""
 
 
 @contextmanager
 def set_environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Add variables to the environment of processes that are started meanwhile."""
+    """Add variables to the environment during the context; processes that are started meanwhile inherit them."""
     before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:

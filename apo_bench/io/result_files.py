@@ -1,7 +1,7 @@
-"""Write result files, whole or not at all.
+"""Write result files, completely or not at all.
 
-A write that fails leaves the old file as it was, and nothing is written through a symbolic link. The exception is the
-records of a sweep, which are appended line by line (`open_to_append`).
+A write that fails leaves the old file unchanged, and nothing is written through a symbolic link. The only exception are
+the records of a sweep, which are appended line by line (`open_to_append`).
 """
 
 import os
@@ -18,12 +18,12 @@ from apo_bench.io.safe_io import kind_of
 
 @contextmanager
 def replace_file(path: str | Path) -> Iterator[IO[bytes]]:
-    """Open a new file that takes the place of `path` at the end of the block, or never if the block fails.
+    """Open a temporary file that replaces `path` at the end of the block, unless the block fails.
 
-    It has the permissions of the file that it replaces.
+    The new file has the permissions of the old one.
 
     Raises:
-        InputError: A link or anything else that is no ordinary file has this path, or it cannot be written.
+        InputError: `path` is a link or no ordinary file, or cannot be written.
     """
     path = Path(path)
     check_target(path)
@@ -40,16 +40,17 @@ def replace_file(path: str | Path) -> Iterator[IO[bytes]]:
             os.fsync(file.fileno())
         os.replace(part, path)
     except OSError as error:
+        # an error of the block itself
         if isinstance(error, BrokenPipeError) or error.filename not in (None, str(part), str(path)):
             raise
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place.") from error
     finally:
         with suppress(OSError):
-            part.unlink()
+            part.unlink()  # exists only after a failure
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
-    """Write a file: all of it or nothing; text becomes UTF-8.
+    """Write a file completely or not at all; text is encoded as UTF-8.
 
     Raises:
         InputError: As `replace_file`.
@@ -59,25 +60,25 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def open_to_append(path: Path) -> IO[bytes]:
-    """Open an ordinary file, or make it, to read it and to append to it, unbuffered.
+    """Open an ordinary file for reading and appending, unbuffered; make it if it does not exist.
 
     Raises:
-        InputError: A link or anything else that is no ordinary file has this path.
-        OSError: It cannot be opened.
+        InputError: `path` is a link or no ordinary file.
+        OSError: The file cannot be opened.
     """
     check_target(path)
     return path.open("a+b", buffering=0)
 
 
 def check_target(path: Path) -> None:
-    """Raise an `InputError` if something else than an ordinary file stands where one is to be written."""
+    """Raise an `InputError` if a path to be written exists and is no ordinary file."""
     mode = _mode(path)
     if mode is not None and not stat.S_ISREG(mode):
         raise InputError(f"{path} is {kind_of(mode)}, and only an ordinary file is written over; remove it.")
 
 
 def _mode(path: Path) -> int | None:
-    """Return the mode of what stands at a path, links not followed; None if nothing does."""
+    """Return the mode at a path, without following links; None if nothing exists there."""
     try:
         return os.lstat(path).st_mode
     except (FileNotFoundError, NotADirectoryError):

@@ -1,4 +1,4 @@
-"""Read ordinary files up to a limit of size."""
+"""Read ordinary files up to a size limit."""
 
 import os
 import stat
@@ -14,13 +14,13 @@ LARGEST_BYTES = 1_000_000
 
 @contextmanager
 def open_file(path: str | Path, kind: str) -> Iterator[BinaryIO]:
-    """An ordinary file, or a link to one, to read from.
+    """Open an ordinary file, or a link to one, for reading.
 
     Args:
         kind: What the file should be, for the message: `sweep file`.
 
     Raises:
-        InputError: There is no such file, it is no ordinary one, or it cannot be read, also while it is open.
+        InputError: There is no such file, it is no ordinary one, or reading fails, also within the block.
     """
     try:
         mode = os.stat(path).st_mode
@@ -41,19 +41,19 @@ def _unreadable(path: str | Path, kind: str, error: OSError) -> InputError:
 
 
 def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes:
-    """What stands in a file.
+    """Return the content of a file.
 
     Raises:
         InputError: It is no ordinary file, cannot be opened, or is larger than the limit.
     """
     with open_file(path, kind) as file:
-        content = file.read(limit + 1)
+        content = file.read(limit + 1)  # one byte more than allowed, to detect more
     require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give {add_article(kind)}.")
     return content
 
 
 def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
-    """The text of a file, without a byte order mark.
+    """Return the text of a file, without a byte order mark.
 
     Raises:
         InputError: It cannot be read, is larger than the limit, or is not UTF-8.
@@ -62,7 +62,7 @@ def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
 
 
 def read_lines(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file, numbered from 1; a last one without an end, torn as it was written, is left out.
+    """Yield number, from 1, and content of each line; an incomplete last line, without an end, is left out.
 
     Raises:
         InputError: It is no ordinary file, or cannot be read.
@@ -72,7 +72,7 @@ def read_lines(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
 
 
 def decode_text(raw: bytes, file: str, kind: str) -> str:
-    """The text in bytes, without a byte order mark; `file` is their name in messages."""
+    """Decode bytes as UTF-8, without a byte order mark; `file` is their name in messages."""
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -93,5 +93,5 @@ _KINDS = (
 
 
 def kind_of(mode: int) -> str:
-    """What a mode of `os.stat` is of, in words: `a folder`."""
+    """Return the kind of a mode of `os.stat` in words: `a folder`."""
     return next((name for is_kind, name in _KINDS if is_kind(mode)), "something else")

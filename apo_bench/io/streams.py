@@ -1,4 +1,4 @@
-"""Standard streams of a command."""
+"""Prepare, flush and redirect the standard streams of a command."""
 
 import ctypes
 import os
@@ -9,11 +9,11 @@ from pathlib import Path
 
 
 class Unusable(Exception):
-    """Nothing can be printed, or no path be found: one sentence."""
+    """The program cannot print, or has no current folder; the message is one sentence."""
 
 
 def prepare() -> str:
-    """Make the standard streams print any text, and return the current folder.
+    """Make the standard streams accept any text, and return the current folder.
 
     Raises:
         Unusable: Standard output is closed, or the current folder was deleted.
@@ -32,10 +32,10 @@ def prepare() -> str:
 
 
 def finish() -> None:
-    """Print what is held back; a pipe that its reader has closed is no error.
+    """Flush standard output; a pipe that its reader has closed is no error.
 
     Raises:
-        Unusable: It could not be printed, such as on a full disk.
+        Unusable: Writing failed, as on a full disk.
     """
     try:
         sys.stdout.flush()
@@ -49,19 +49,19 @@ def finish() -> None:
 
 
 def give_up_output() -> None:
-    """Send what is still to be printed nowhere."""
+    """Discard all further output, so that nothing fails at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def unexpected(error: OSError) -> str:
-    """Return the sentence for a file that could not be read or written where the program does not expect it."""
+    """Return the sentence about a file error that the program does not expect at that place."""
     if error.filename is not None:
         return f"{error.filename}: {error.strerror}."
     return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
 
 
 def flush() -> None:
-    """Write to standard output what Python and the C library still hold back."""
+    """Flush the buffers of Python and of the C library for standard output."""
     for stream in (sys.stdout, sys.__stdout__):
         if stream is not None:
             with suppress(OSError, ValueError):
@@ -72,9 +72,9 @@ def flush() -> None:
 
 @contextmanager
 def redirect_output(wanted: bool) -> Iterator[None]:
-    """If wanted, send what is printed meanwhile, by whatever code and below Python too, to standard error.
+    """If `wanted`, send everything printed within the block to standard error, also from below Python.
 
-    Standard output is then left to one JSON object.
+    Standard output is then free for one JSON object.
     """
     if not wanted:
         yield

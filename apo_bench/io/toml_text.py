@@ -1,4 +1,4 @@
-"""Documents as TOML text."""
+"""Write documents as TOML text."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -9,12 +9,13 @@ def format_toml(document: Mapping[str, Any]) -> str:
     """Return a document of tables, lists, texts and numbers as TOML.
 
     Args:
-        document: Keys without dots and quotes; a table in it becomes a section, and so does each of a list of tables.
+        document: Keys without dots and quotes; each table in it, and each of a list of tables, becomes a section.
     """
     return "\n".join(_lines(document, "")) + "\n"
 
 
 def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    """Yield the lines of a table: first its plain keys, then its sections, whose names begin with `prefix`."""
     sections = []
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -22,7 +23,7 @@ def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
             sections += [(f"[[{prefix}{key}]]", each, f"{prefix}{key}.") for each in value]
         else:
-            # JSON writes texts, numbers, truth values and lists as TOML has them.
+            # JSON and TOML write texts, numbers, booleans and lists in the same way
             yield f"{key} = {json.dumps(value, ensure_ascii=False)}"
     for head, value, inner in sections:
         yield from ("", head, *_lines(value, inner))

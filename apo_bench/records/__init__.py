@@ -1,4 +1,4 @@
-"""Settings and records of trials, shared by everything that makes or reads them."""
+"""Settings and records of trials, shared by all code that makes or reads them."""
 
 from apo_bench.records.contact_sources import (
     DETECTED,

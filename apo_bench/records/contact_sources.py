@@ -1,4 +1,4 @@
-"""Sources of the contacts that a corrector gets, by the names that records use.
+"""Names of the sources of a corrector's contacts, as records have them.
 
 `given`             the correct contacts
 `false-negative`    one contact is missing
@@ -20,22 +20,22 @@ WRONG_CONTACTS = MappingProxyType(
         "face-offset": "apo_bench.perception.observation.wrong_contacts:FaceOffset",
     }
 )
-"""Sources of wrong contacts."""
+"""Sources of wrong contacts -> the function or class that makes them."""
 GIVEN = "given"
 """The correct contacts, which come with the demonstration."""
 WRONG = tuple(WRONG_CONTACTS)
 DETECTED = ("detected", "detected-jointly")
 _KINDS = (GIVEN, *WRONG, *DETECTED)
 FACE_OFFSET_MM = 2.0
-"""Default of `face-offset`."""
-_LARGEST_OFFSET_MM = 50.0
+"""Default offset of `face-offset`."""
+_LARGEST_OFFSET_MM = 50.0  # largest offset
 
 
 def normalise_contact_source(text: str) -> str:
-    """The canonical name of a contact source: `face-offset:3.0mm` is `face-offset:3mm`.
+    """Return the canonical name of a contact source: `face-offset:3.0mm` becomes `face-offset:3mm`.
 
     Raises:
-        InputError: A size that is not allowed.
+        InputError: The offset is not allowed.
     """
     kind, _, size = text.partition(":")
     if kind != "face-offset":
@@ -45,10 +45,10 @@ def normalise_contact_source(text: str) -> str:
 
 
 def parse_face_offset(text: str) -> float:
-    """The size in `face-offset:3mm`, [mm].
+    """Return the offset in `face-offset:3mm`, [mm].
 
     Raises:
-        InputError: It has no unit, is no number, or is out of range.
+        InputError: The offset has no unit, is no number, or is out of range.
     """
     size = text.partition(":")[2]
     try:
@@ -64,7 +64,7 @@ def parse_face_offset(text: str) -> float:
 
 
 def checked_contact_source(text: str) -> str:
-    """The canonical name of a contact source; raise an `InputError` if there is no such source."""
+    """Return the canonical name of a contact source, or raise an `InputError` if there is no such source."""
     require_text("contact source", text)
     name = normalise_contact_source(text)
     require(

@@ -1,10 +1,10 @@
-"""Noise of the force-torque sensor at the wrist, by the names that records use.
+"""Names of the noise of the force-torque sensor at the wrist, as records have them.
 
 `ideal`         no noise
 `wrist`         0.1 N, 5 mNm: a good sensor between arm and hand, as of a Robotiq FT 300-S
 `wrist-coarse`  0.2 N, 10 mNm: a coarser one, as of an OnRobot HEX-E
 `joint-torque`  3.5 N, 0.2 Nm: an arm's own, the stated precision of a Universal Robots UR5e
-`0.5/0.02`      N and Nm; by default 0.05 Nm to each N
+`0.5/0.02`      N and Nm; the default torque noise is 0.05 Nm per N
 
 Each is the standard deviation of the white noise of one reading, per axis, at 1,000 readings a second.
 docs/guide/real-robot.md states the sources of these numbers.
@@ -33,16 +33,16 @@ _PRESETS = MappingProxyType(
         "joint-torque": FtNoise(3.5, 0.2),
     }
 )
-_N_PER_NM = 20.0
-_MOST = FtNoise(10.0, 5.0)
-"""A touch ends at six standard deviations of a reading, 13.5 N with such a sensor; 14 N is a collision."""
+_N_PER_NM = 20.0  # default ratio of force noise to torque noise
+_MOST = FtNoise(10.0, 5.0)  # largest standard deviations
+"""A touch ends at six standard deviations of a reading after the filter, 13.5 N here; 14 N counts as a collision."""
 
 
 def parse_ft_noise(name: str) -> FtNoise:
-    """The noise of a sensor.
+    """Return the noise of a sensor by its name, or from numbers.
 
     Raises:
-        InputError: No name, an unknown one, or a number that is not allowed.
+        InputError: The name is unknown, or a number is not allowed.
     """
     require_text("force-torque sensor", name)
     if name in _PRESETS:
@@ -51,7 +51,7 @@ def parse_ft_noise(name: str) -> FtNoise:
         require_known("force-torque sensor", name, _PRESETS, rest=" Or give its noise in N and Nm: 0.1/0.005.")
     try:
         force, *rest = (float(size) + 0.0 for size in name.split("/"))
-        (torque,) = rest or [force / _N_PER_NM]
+        (torque,) = rest or [force / _N_PER_NM]  # a second number is optional
     except ValueError:
         force = torque = math.nan
     require(
@@ -63,7 +63,7 @@ def parse_ft_noise(name: str) -> FtNoise:
 
 
 def normalise_ft_sensor(name: str) -> str:
-    """The canonical name of a sensor: a preset where one has its noise, else numbers that read back as they are.
+    """Return the canonical name of a sensor: the preset with this noise, else numbers that are read back exactly.
 
     Raises:
         InputError: As in `parse_ft_noise`.

@@ -1,4 +1,4 @@
-"""Names of methods."""
+"""Names of methods, and the properties that follow from a name."""
 
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -19,38 +19,38 @@ CORRECTORS = MappingProxyType(
         "penalty": "apo_bench.correction.baselines.penalty:penalty",
     }
 )
-"""The correctors that need an observation and nothing else."""
+"""Correctors that need only an observation -> the function."""
 CORRECTOR = "contact-robust"
 """The default corrector."""
 REOBSERVING = ("contact-robust",)
-"""Correctors that may observe operations again."""
+"""Correctors of the package that may observe operations again."""
 SIMULATED = MappingProxyType({"physics-settle": "apo_bench.simulation.scene.settling:settle"})
-"""Correctors that need a simulator; `correct` does not know them, a trial does."""
+"""Correctors that need a simulator: `correct` does not know them, a trial does."""
 WITHOUT_CORRECTOR = ("oracle", "uncorrected", "nominal")
-"""Plans of the true poses, the observed poses, or the scenario's own poses fitted to the observed ones."""
+"""Methods without a corrector: they plan the true poses, the observed poses, or the scenario's poses fitted to them."""
 METHODS = (*WITHOUT_CORRECTOR, *CORRECTORS, *SIMULATED)
-"""Methods by name."""
+"""Methods by name, without `spiral-search` and suffixes."""
 SPIRAL_SEARCH = "spiral-search"
-"""The observed poses, executed by a robot that searches for holes in a spiral."""
+"""Replays the observed poses, with a robot that searches for holes in a spiral."""
 _SPIRAL = "+spiral"
-"""After any other method: the robot searches for holes in a spiral."""
+"""Suffix of any other method: the robot searches for holes in a spiral."""
 _PROBE = "+probe"
-"""After any method: the robot probes fixed surfaces to estimate its own calibration error."""
+"""Suffix of any method: the robot probes fixed surfaces to estimate its own calibration error."""
 
 
 class Method(NamedTuple):
-    """A parsed method."""
+    """The parts of a method's name."""
 
     corrector: Any
-    """What makes the plan: `oracle`, `uncorrected`, `nominal`, or a corrector, by name or itself."""
+    """`oracle`, `uncorrected`, `nominal`, or a corrector, as a name or as the function."""
     spiral: bool = False
-    """Whether the robot searches for holes in a spiral; one that probes does so as a last resort."""
+    """Whether the robot searches for holes in a spiral; a robot that probes does so as a last resort."""
     probe: bool = False
     """Whether the robot probes fixed surfaces."""
 
 
 def parse_method(method: str) -> Method:
-    """Parse the name of a method."""
+    """Split the name of a method into its parts."""
     if method == SPIRAL_SEARCH:
         return Method("uncorrected", spiral=True)
     if method.endswith(_PROBE):
@@ -59,11 +59,12 @@ def parse_method(method: str) -> Method:
 
 
 def checked_method(method: str) -> str:
-    """The canonical name of a method: `uncorrected+spiral` is `spiral-search`.
+    """Return the canonical name of a method: `uncorrected+spiral` becomes `spiral-search`.
 
     Raises:
-        InputError: It is not `oracle`, `uncorrected`, `nominal`, `spiral-search`, a corrector by name, or
-            `module:name`, nor one with `+spiral` or `+probe`.
+        InputError: The name is not `oracle`, `uncorrected`, `nominal`, `spiral-search`, a corrector, or `module:name`,
+        with
+            or without `+spiral` or `+probe`.
     """
     require_text("method", method)
     corrector, spiral, probe = parse_method(method)
@@ -79,32 +80,32 @@ def checked_method(method: str) -> str:
 
 
 def knows_truth(method: str) -> bool:
-    """Whether a method replays the true poses, so that neither noise nor human error affects it."""
+    """Return whether a method replays the true poses, so that neither noise nor human error affects it."""
     return parse_method(method).corrector == "oracle"
 
 
 def is_uncorrected(method: str) -> bool:
-    """Whether a method replays the observed poses."""
+    """Return whether a method replays the observed poses."""
     return parse_method(method).corrector == "uncorrected"
 
 
 def uses_contacts(method: str) -> bool:
-    """Whether a method uses contacts: whether it has a corrector."""
+    """Return whether a method has a corrector, which uses contacts."""
     return parse_method(method).corrector not in WITHOUT_CORRECTOR
 
 
 def may_reobserve(method: str) -> bool:
-    """Whether a method may observe operations again: a corrector that does so, or your own."""
+    """Return whether a method may observe operations again: a corrector that does so, or one of the user."""
     corrector = parse_method(method).corrector
     return corrector in REOBSERVING or ":" in corrector
 
 
 def probes(method: str) -> bool:
-    """Whether the robot of a method probes, so that it has a force-torque sensor at its wrist."""
+    """Return whether the robot of a method probes, for which it has a force-torque sensor at its wrist."""
     return parse_method(method).probe
 
 
-_AFFECTED_BY = MappingProxyType(
+_AFFECTED_BY = MappingProxyType(  # setting -> whether it affects a method; all other settings affect all methods
     {
         "noise": lambda method: not knows_truth(method),
         "human_error_scale": lambda method: not knows_truth(method),
@@ -117,11 +118,11 @@ _AFFECTED_BY = MappingProxyType(
 
 
 def affects(setting: str, method: str) -> bool:
-    """Whether a setting affects a method."""
+    """Return whether a setting affects a method."""
     return setting not in _AFFECTED_BY or _AFFECTED_BY[setting](method)
 
 
 def resolve_simulated(corrector: Any) -> Any:
-    """What to pass to `correct`: the function, where a name stands for a corrector that needs a simulator."""
+    """Return the function of a corrector that needs a simulator, if given by name; other correctors as they are."""
     known = isinstance(corrector, str) and corrector in SIMULATED
     return resolve(corrector, SIMULATED, "corrector") if known else corrector

@@ -1,7 +1,7 @@
-"""Stages and codes of endings, each with its sentence.
+"""Stages and codes of the outcomes of trials, with a sentence for each code.
 
-A physical failure is a result, not an exception. `{part}` and `{operation}` (counted from 1) are filled in where the
-outcome is made; no other words appear in a record.
+A physical failure is a result, not an exception. `{part}` and `{operation}` (counted from 1) are filled in when the
+outcome is made.
 """
 
 from types import MappingProxyType
@@ -10,8 +10,7 @@ STAGES = (
     *("demonstrate", "observe", "correct", "predicted-success", "plan", "touch", "pick", "lift", "carry", "attach"),
     *("release", "depart", "judge", "worker"),
 )
-"""Where a trial can fail, in the order of a trial, and last the process that runs it; `done` is where one that did not
-fail ends."""
+"""Stages at which a trial can fail, in order; `worker` is the process that runs it. A success ends at `done`."""
 
 CODES = MappingProxyType(
     {
@@ -58,14 +57,14 @@ _TOUCHING = MappingProxyType(
         "unstable_simulation": "the simulation became unstable while the arm touched what is fixed",
     }
 )
-"""The same of a robot that feels, before it takes a part."""
+"""Sentences of these codes for a robot that probes, before its first operation."""
 
 
 def describe_touch(code: str, *, part: str = "") -> str:
-    """The sentence of a code of the stage `touch`, which is of no operation."""
+    """Return the sentence of a code of the stage `touch`, which belongs to no operation."""
     return _TOUCHING[code].format(part=part)
 
 
 def describe_outcome(code: str, *, part: str = "", operation: int = 0) -> str:
-    """The sentence of a code; `operation` counted from 0."""
+    """Return the sentence of a code; `operation` counts from 0."""
     return CODES[code].format(part=part, operation=operation + 1)

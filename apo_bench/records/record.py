@@ -1,8 +1,8 @@
 """The record of a trial: one line of `trials.jsonl`.
 
-Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbered from 1. Records are checked by these
-types when they are written and read: finite numbers in their range, and no other columns. The trials of one sweep
-differ in the columns `KEY`.
+Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbered from 1. These types check a record
+whenever it is written or read: numbers are finite and in range, and there are no other columns. The columns `KEY`
+distinguish the trials of one sweep.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,9 +15,9 @@ from msgspec import Meta
 from apo_bench.records.outcomes import CODES, STAGES
 from apo_bench.records.settings import LARGEST_SEED, SETTINGS, Name, TrialConfig
 
-LONGEST_SENTENCE = 1000
+LONGEST_SENTENCE = 1000  # letters
 LARGEST_NUMBER = 1e15
-"""Of a number that physics or a solver gave; beyond, sums and pictures of it say nothing."""
+"""Bound of numbers from physics or a solver; sums and plots of larger ones have no meaning."""
 _Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 _Size = Annotated[float, Meta(ge=0.0, le=LARGEST_NUMBER)]
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -27,7 +27,7 @@ _Pose = Annotated[list[_Number], Meta(min_length=7, max_length=7)]
 
 
 class FreedSet(TypedDict):
-    """A set of operations that were freed, and the gap that was left [mm]."""
+    """Operations that were freed at a step of the schedule, and the contact gap that was left [mm]."""
 
     step: _Operation
     free: list[_Operation]
@@ -35,7 +35,7 @@ class FreedSet(TypedDict):
 
 
 class FreeMoved(TypedDict):
-    """An operation, and how far its goal was moved, [mm] and [deg]."""
+    """The distance by which the target pose of an operation was moved, [mm] and [deg]."""
 
     operation: _Operation
     mm: _Size
@@ -43,19 +43,19 @@ class FreeMoved(TypedDict):
 
 
 class GraspSlip(TypedDict):
-    """An operation, and how far its part moved in the hand after the grasp, [mm] and [deg]."""
+    """The distance by which a part moved in the hand after the grasp, [mm] and [deg]."""
 
     operation: _Operation
     carried_mm: _Size
     carried_deg: _Size
-    """When its last motion, to its place, began."""
+    """At the beginning of its last motion, to its place."""
     mm: _Size
     deg: _Size
-    """When it was let go of, or the replay failed."""
+    """At its release, or when the replay failed."""
 
 
 class FailurePrediction(TypedDict):
-    """The prediction of failure, and how far off the plan is then [mm]."""
+    """The failure prediction of a plan, and the size of the predicted error [mm]."""
 
     fails: bool
     operation: _Operation | None
@@ -71,11 +71,11 @@ class FailurePrediction(TypedDict):
     ]
     size_mm: NotRequired[_Number | None]
     sentence: NotRequired[str]
-    """Of what the arm cannot do."""
+    """Why the arm cannot execute the plan."""
 
 
 class _Columns(TypedDict, total=False):
-    """Columns before the results whose names stand in the code; the columns of all settings are in `RECORD_FIELDS`."""
+    """Columns before the results that code accesses by name; `RECORD_FIELDS` has the columns of all settings."""
 
     schema: str
     env_id: str
@@ -99,75 +99,74 @@ _COLUMNS = frozenset(get_type_hints(_Columns))
 
 
 class TrialRecord(_Columns, total=False):
-    """A complete record has all of these, in this order; the record of a part of a trial has some of them."""
+    """A record with results; a complete one has all of these columns, in this order."""
 
     thresholds: dict[str, _Size] | None
-    """What the judge demands: lengths in mm, angles in degrees."""
+    """Thresholds of the judge: lengths in mm, angles in degrees."""
     demonstration: str | None
-    """How the human's own assembly ended: `ok` or a code."""
+    """Outcome of the human's own assembly: `ok` or a code."""
     success: bool | None
-    """Whether the finished assembly is right; null if the demonstration itself was not, so that the trial does not
-    count."""
+    """Whether the finished assembly is correct; null if the demonstration failed, so that the trial does not count."""
     as_demonstrated: bool | None
     """Whether every contact was also made when and where it was demonstrated."""
     loose_success: bool | None
     """Success with the loose thresholds, 5 mm and 5 degrees."""
     failure_stage: str | None
-    """Stage at which a trial failed that was no success."""
+    """Stage at which the trial failed; null for a success."""
     failure_code: str | None
-    """Code of why a trial failed that was no success."""
+    """Code of the failure; null for a success."""
     failure_operation: _Operation | None
-    """Operation in which a trial failed, if it is known."""
+    """Operation in which the trial failed, if it is known."""
     sentence: str | None
-    """How the trial ended, for a person."""
+    """The outcome as a sentence."""
     as_demonstrated_code: str | None
-    """Code of why a trial is not as demonstrated."""
+    """Code of why the assembly was not made as demonstrated."""
     conditions: dict[str, bool] | None
-    """The conditions of success, each by itself."""
+    """Condition of success -> whether it holds."""
     worst_gap_mm: _Number | None
-    """Largest gap, or depth, of faces that should touch [mm]."""
+    """Largest gap, or penetration, of faces that should touch [mm]."""
     worst_angle_deg: _Number | None
     """Largest angle between faces that should touch [deg]."""
     least_overlap: _Number | None
-    """Smallest overlap of faces that should touch, as a part of the true overlap."""
+    """Smallest overlap of faces that should touch, as a share of the true overlap."""
     penetration_mm: _Number | None
-    """Largest depth of one part in another [mm]."""
+    """Largest penetration of one part into another [mm]."""
     placed_part_shift_mm: _Number | None
-    """Largest distance by which a part that was in place was moved, whether or not it counts [mm]."""
+    """Largest distance by which a part that was in place was moved, whether or not it affects the verdict [mm]."""
     corrected_operations: list[_Operation] | None
     """Operations whose motion parameters were corrected."""
     tried_corrections: list[FreedSet] | None
-    """Which operations were freed at which step, and the gap that was left."""
+    """The operations that were freed at each step, and the gap that was left."""
     extra_steps: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
     """Steps of the plan beyond doing every operation once."""
     fit_adjustments: list[FreeMoved] | None
-    """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
+    """Poses of the corrected plan that were moved along free directions, so that parts fit; null if there are none."""
     failure_prediction: FailurePrediction | None
     """The prediction of failure, before the plan is executed."""
     predicted_success: _Share | None
-    """Predicted success probability, before the plan is executed; null without a plan."""
+    """Predicted success probability of the plan, before it is executed; null without a plan."""
     gap_before_mm: _Number | None
     """Gap of the contacts at the observed poses [mm]."""
     gap_after_mm: _Number | None
     """Gap of the contacts at the corrected poses [mm]."""
     chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
-    """Statistic of the test whether contacts and observed poses are consistent."""
+    """Statistic of the test of consistency between contacts and observed poses."""
     chi_square_dof: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
     consistent: bool | None
-    """Whether contacts and observed poses are consistent by that test."""
+    """Whether that test finds contacts and observed poses consistent."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
     dropped_contacts: list[Name] | None
     """Contacts that the corrector left out."""
     rejected_observations: list[_Operation] | None
-    """Operations that were inferred, since nothing was observed of them or the corrector rejects it."""
+    """Operations whose pose was inferred, since they were not observed or the corrector rejected the observation."""
     reobservations: _Count | None
-    """How many operations were observed again, all together; null without a corrector."""
+    """Number of reobservations of all operations; null without a corrector."""
     wrong_contact: Name | None
-    """The contact that is wrong, where wrong ones were given."""
+    """The wrong contact, if the contact source adds, omits or displaces one."""
     inside_95: bool | None
     """Whether the truth lies in the 95 % region that the corrector states."""
     planned_error_fixed_mm: _Size | None
@@ -181,43 +180,47 @@ class TrialRecord(_Columns, total=False):
     contacts_false_positive: _Count | None
     """Given contacts that are wrong."""
     joint_control: str | None
-    """What moved the joints of the arm, its own actuators or servos made for it, and how much stronger the drive of its
-    gripper was made; null where nothing was carried out."""
+    """How the joints are driven: by the arm's own actuators, or by servos made for it; null if nothing was executed.
+
+    The text also states the factor by which the drive of the gripper was made stronger.
+    """
     reached: dict[str, _Pose] | None
-    """Part -> where it ended: x, y, z [mm], qw, qx, qy, qz, world frame."""
+    """Part -> its final pose: x, y, z [mm], qw, qx, qy, qz, world frame."""
     pose_error_fixed_mm: _Size | None
-    """Root mean square distance of where the parts ended from the truth, along directions that contacts fix [mm]."""
+    """Root mean square distance of final poses from the truth, along directions that contacts fix [mm]."""
     pose_error_free_mm: _Size | None
-    """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
+    """Root mean square distance of final poses from the truth, along directions that contacts leave free [mm]."""
     peak_force_n: _Size | None
-    """Largest contact force on what was held, without the gripper's, behind a low-pass filter of 20 ms [N]."""
+    """Largest contact force on the held part, without that of the gripper, after a low-pass filter of 20 ms [N]."""
     grasp_slip: list[GraspSlip] | None
-    """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
+    """How far each part moved in the hand, until its last motion began and until its release."""
     probe_contacts: _Count | None
-    """Probe contacts that the robot used. This and what follows is null for a robot that does not probe."""
+    """Probe contacts that the robot used; this and the following columns are null for a robot that does not probe."""
     probe_contacts_rejected: _Count | None
-    """Probe contacts that contradicted the others, so that the robot rejected them."""
+    """Probe contacts that the robot rejected, since they contradicted the others."""
     base_error_estimate_mm: _Size | None
-    """The final estimate of the error of the robot's base, at the middle of the poses [mm]."""
+    """Final estimate of the error of the robot's base, at the centre of the poses [mm]."""
     base_error_estimate_deg: _Size | None
     """The same as an angle [deg]."""
     base_error_std_mm: _Size | None
-    """The stated standard deviation of that: root mean square, as a vector [mm]."""
+    """Stated standard deviation of that estimate: root mean square of the vector [mm]."""
     base_error_std_deg: _Size | None
-    """The same of the angle [deg]."""
+    """Stated standard deviation of the angle [deg]."""
     sim_time_s: _Size | None
     """Simulated time [s]."""
 
 
 def _setting_columns() -> Iterator[tuple[str, Any]]:
+    """Yield name and type of the column of each setting; settings of a random draw may be null."""
     literal: Any = Literal
     for name, info in SETTINGS.items():
         kind = Name if name == "secret_seed" else literal[info.choices] if info.choices else info.kind
         yield name, kind | None if info.drawn else kind
 
 
-_LITERAL: Any = Literal
+_LITERAL: Any = Literal  # mypy allows no computed Literal
 _CODE = _LITERAL[tuple(CODES)] | None
+# columns that have one of a few values
 _CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
 _CLOSED["failure_stage"] = _LITERAL[STAGES] | None
 RECORD_FIELDS: Mapping[str, Any] = MappingProxyType(
@@ -226,45 +229,45 @@ RECORD_FIELDS: Mapping[str, Any] = MappingProxyType(
     | {name: kind for name, kind in get_type_hints(TrialRecord, include_extras=True).items() if name not in _COLUMNS}
     | _CLOSED
 )
-"""Column -> its type, with the range that it may have."""
+"""Column -> its type, with its range."""
 REQUIRED = (
     *("schema", "env_id", "config_hash", *(name for name in SETTINGS if name != "secret_seed")),
     *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),
 )
-"""Columns without which a line is no record; other columns that are missing are null."""
+"""Columns that every record must have; other missing columns are null."""
 
 
 def replace_infinite(x: float | None) -> float | None:
-    """A number that a record can hold, else null."""
+    """Return a number that a record can hold, or None for one that is infinite, NaN or too large."""
     return float(x) if x is not None and abs(x) <= LARGEST_NUMBER else None
 
 
 Key = tuple[Any, ...]
-"""The columns `KEY` of a record."""
+"""The values of the columns `KEY`, which identify a trial within a sweep."""
 KEY = tuple(info.name for info in SETTINGS.values() if info.key)
 _KEY_VALUES = itemgetter(*KEY)
 
 
 def get_record_key(record: Mapping[str, Any]) -> Key:
-    """The key of the trial that a record is of."""
+    """Return the key of the trial of a record."""
     key: Key = _KEY_VALUES(record)
     return key
 
 
 def make_trial_key(trial: TrialConfig, scenario: str) -> Key:
-    """The key of a trial.
+    """Return the key of a trial.
 
     Args:
-        scenario: The name of the scenario.
+        scenario: Name of the scenario.
     """
     return get_record_key(list_setting_columns(trial, scenario))
 
 
 def list_setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
-    """The settings as they stand in a record.
+    """Return the columns of a record that hold the settings.
 
     Args:
-        scenario: The name of the scenario.
+        scenario: Name of the scenario.
     """
     columns = {info.name: getattr(settings, name) for name, info in SETTINGS.items()}
     return columns | {
@@ -274,7 +277,7 @@ def list_setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]
 
 
 def restore_settings(record: Mapping[str, Any], scenario: str) -> TrialConfig:
-    """The settings of the trial that a record is of, without its salt, which no record tells.
+    """Return the settings of the trial of a record, without its secret seed, which a record does not hold.
 
     Args:
         scenario: A name, or the path of a scenario file.
@@ -284,7 +287,7 @@ def restore_settings(record: Mapping[str, Any], scenario: str) -> TrialConfig:
 
 
 def convert_to_python_units(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their names, in the units of Python, out of those by their options; other names stay."""
+    """Rename options to settings, and convert their values to the units of Python; other names stay."""
     values = dict(options)
     for name, info in SETTINGS.items():
         if info.keyword != name and info.keyword in values:

@@ -1,12 +1,12 @@
-"""Names of robot errors: kinds with their standard deviations.
+"""Names of robot errors: kinds of error with their standard deviations.
 
 `none`              no error
-`hand_eye:1/0.2`    of the robot's base in the camera's frame: mm per axis, degrees per axis
-`joints:0.05`       of the zero of every joint: degrees
-`tool:0.5`          of the tip on the hand: mm per axis
-`in_hand:0.5/1`     of a part in the hand after the grasp: mm along the pads, degrees about their normal
+`hand_eye:1/0.2`    pose of the robot's base in the camera's frame: mm per axis, degrees per axis
+`joints:0.05`       zero of every joint: degrees
+`tool:0.5`          position of the tip on the hand: mm per axis
+`in_hand:0.5/1`     pose of a part in the hand after the grasp: mm along the pads, degrees about their normal
 
-Several are joined by `+`. A robot that probes assumes such errors:
+Several kinds are joined by `+`. A robot that probes assumes such an error:
 
 `matched`           the standard deviations that its error is drawn with
 `unknown`           usual ones
@@ -22,13 +22,13 @@ NO_ROBOT_ERROR = "none"
 MATCHED = "matched"
 _UNKNOWN = "unknown"
 _LARGEST = 20.0
-"""Standard deviation, [mm] or [deg]."""
+"""Largest standard deviation, [mm] or [deg]."""
 _UNITS = {"hand_eye": ("mm", "degrees"), "joints": ("degrees",), "tool": ("mm",), "in_hand": ("mm", "degrees")}
-"""Kind -> what its numbers are; the second one may be left out and is 0 then."""
+"""Kind -> units of its numbers; a second number is optional, with default 0."""
 
 
 class Sigmas(NamedTuple):
-    """Standard deviations, [mm] and [deg]."""
+    """Standard deviations of each kind; pairs are [mm] and [deg]."""
 
     hand_eye: tuple[float, float] = (0.0, 0.0)
     joints_deg: float = 0.0
@@ -37,13 +37,13 @@ class Sigmas(NamedTuple):
 
 
 def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
-    """The standard deviations of a name.
+    """Parse the name of a robot error.
 
     Args:
-        called: The setting, for the error.
+        called: Name of the setting, for the message.
 
     Raises:
-        InputError: An unknown kind, one that stands twice, or a number that is not allowed.
+        InputError: A kind is unknown or occurs twice, or a number is not allowed.
     """
     require_text(called, name)
     sigmas: dict[str, tuple[float, float]] = {}
@@ -57,7 +57,7 @@ def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
 
 
 def normalise_robot_error(name: str) -> str:
-    """The canonical name of the robot's errors, `none` if all are zero.
+    """Return the canonical name of a robot error; `none` if all numbers are zero.
 
     Raises:
         InputError: As in `parse_robot_error`.
@@ -66,10 +66,10 @@ def normalise_robot_error(name: str) -> str:
 
 
 def normalise_assumed_robot_error(name: str) -> str:
-    """The canonical name of an assumed error.
+    """Return the canonical name of an assumed robot error.
 
     Raises:
-        InputError: It is neither `matched` nor `unknown`, nor what `parse_robot_error` takes.
+        InputError: The name is neither `matched` nor `unknown`, nor one that `parse_robot_error` takes.
     """
     require_text("assumed robot error", name)
     if name in (MATCHED, _UNKNOWN):
@@ -80,7 +80,7 @@ def normalise_assumed_robot_error(name: str) -> str:
 
 
 def parse_assumed_error(assumed_robot_error: str, robot_error: str) -> str | None:
-    """The error that a robot assumes, as in `parse_robot_error`; None for usual ones.
+    """Return the error that a robot assumes, as in `parse_robot_error`; None means the usual one.
 
     Args:
         assumed_robot_error, robot_error: As in records.
@@ -91,7 +91,7 @@ def parse_assumed_error(assumed_robot_error: str, robot_error: str) -> str | Non
 
 
 def _numbers(given: str, kind: str, sizes: str) -> tuple[float, float]:
-    """The one or two numbers of a kind; the second is 0 by default."""
+    """Parse the one or two numbers of a kind; the second is 0 by default."""
     units = _UNITS[kind]
     try:
         numbers = tuple(float(size) + 0.0 for size in sizes.split("/"))
@@ -108,11 +108,12 @@ def _numbers(given: str, kind: str, sizes: str) -> tuple[float, float]:
 
 
 def _spell(sigmas: Sigmas) -> str:
+    """Return the canonical name of standard deviations, without kinds that are zero."""
     kinds = zip(_UNITS, ((*s, 0.0)[:2] if isinstance(s, tuple) else (s, 0.0) for s in sigmas), strict=True)
     return "+".join(f"{kind}:{spell_sizes(sizes)}" for kind, sizes in kinds if any(sizes)) or NO_ROBOT_ERROR
 
 
 def spell_sizes(sizes: tuple[float, float]) -> str:
-    """`1`, or `1/0.2`: numbers that read back as they are."""
+    """Format `1`, or `1/0.2`: numbers that are read back exactly."""
     needed = sizes if sizes[1] else sizes[:1]
     return "/".join(repr(x).removesuffix(".0") for x in needed)

@@ -1,4 +1,4 @@
-"""A secret that enters every random stream, so that only its owner can draw the trials of a sweep again."""
+"""Secret seeds, which enter every random stream, so that only their owner can draw the trials of a sweep again."""
 
 import hashlib
 import hmac
@@ -17,38 +17,45 @@ import numpy as np
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_bytes
 
-FEWEST_BYTES = 16
+FEWEST_BYTES = 16  # 128 bits
 _MOST_BYTES = 512
-"""Of a secret seed; 16 are 128 bits."""
+"""Most bytes of a secret seed."""
 _FEWEST_DIFFERENT = 8
-"""Of 16 bytes at random fewer are different in one of 10^11 cases."""
-_FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
+"""Fewest distinct bytes; of 16 random bytes, fewer are distinct in one of 10^11 cases."""
+_FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")  # whole bytes as hexadecimal digits
 _TEXT = "one line of 32 to 1024 hexadecimal digits, an even number of them, drawn at random"
 
 
 @final
 @dataclass(frozen=True)
 class SecretSeed:
-    """Known to the processes that run trials, and written to no file but its own."""
+    """A secret seed, known only to the processes that run trials, and written to no file but its own."""
 
     secret: bytes = field(repr=False)
 
     @cached_property
     def hash(self) -> str:
-        """16 hexadecimal digits that tell secret seeds apart and reveal none."""
+        """16 hexadecimal digits that identify a secret seed without revealing it."""
         return hashlib.sha256(b"apo-bench/salt/name/" + self.secret).hexdigest()[:16]
 
     def words(self, seed: int, which: int) -> list[int]:
-        """Eight numbers of 32 bits for one stream of one trial; those of one stream say nothing of another's."""
+        """Return eight 32-bit numbers that seed one stream of one trial.
+
+        Numbers of one stream do not reveal those of another.
+
+        Args:
+            seed: Number of the trial.
+            which: Number of the stream.
+        """
         digest = hmac.digest(self.secret, f"apo-bench/salt/stream/{seed}/{which}".encode(), "sha256")
         return [int(word) for word in np.frombuffer(digest, dtype=">u4")]
 
 
 def read_secret_seed(path: str | Path) -> SecretSeed:
-    """The secret seed of a file.
+    """Read a secret seed from its file.
 
     Raises:
-        InputError: There is no such file, it cannot be read, or it holds something else.
+        InputError: There is no such file, it cannot be read, or it is no secret seed.
     """
     match = _FORM.fullmatch(read_bytes(path, "secret seed file"))
     secret = bytes.fromhex(match[1].decode()) if match is not None else b""
@@ -60,7 +67,7 @@ def read_secret_seed(path: str | Path) -> SecretSeed:
 
 
 def open_secret_seed(path: str | Path, folder: str | Path) -> SecretSeed:
-    """The secret seed of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
+    """Read a secret seed; make the file if it does not exist and the folder of the sweep holds no trial yet.
 
     Raises:
         InputError: The file is no secret seed, cannot be read, or cannot be made.
@@ -78,7 +85,7 @@ def open_secret_seed(path: str | Path, folder: str | Path) -> SecretSeed:
 
 
 def make_secret_seed(path: Path) -> None:
-    """Write 256 random bits to a file that only its owner can read; a file that is there by then is left as it is.
+    """Write 256 random bits to a file that only its owner can read; an existing file is left as it is.
 
     Raises:
         InputError: The file cannot be made.
@@ -91,14 +98,15 @@ def make_secret_seed(path: Path) -> None:
 
 
 def _open_privately(path: str, flags: int) -> int:
+    # readable and writable by the owner only
     return os.open(path, flags, 0o600)
 
 
 def find_common_secret_seed(records: Iterable[Mapping[str, Any]]) -> str | None:
-    """The hash of the secret seed that all records were drawn with; None for none.
+    """Return the hash of the secret seed that all records were drawn with; None if there is none.
 
     Raises:
-        InputError: They were drawn with several.
+        InputError: The records were drawn with several.
     """
     hashes = sorted({record.get("secret_seed") or "" for record in records})
     require(
@@ -110,12 +118,12 @@ def find_common_secret_seed(records: Iterable[Mapping[str, Any]]) -> str | None:
 
 
 def check_same_secret_seed(holder: str, at_hand: str | None, drawn: str | None) -> None:
-    """Raise an `InputError` unless a secret seed, or none, is the one that trials were drawn with.
+    """Raise an `InputError` unless the secret seed at hand is the one that existing trials were drawn with.
 
     Args:
-        holder: What holds the trials, in words.
-        at_hand: The hash of the secret seed at hand; None if there is none.
-        drawn: The hash in their records.
+        holder: Folder or file that holds the trials, in words.
+        at_hand: Hash of the secret seed at hand; None if there is none.
+        drawn: Hash in the records of the trials; None if they were drawn without one.
     """
     if at_hand == drawn:
         return
@@ -127,5 +135,5 @@ def check_same_secret_seed(holder: str, at_hand: str | None, drawn: str | None) 
 
 
 def describe_secret_seed(drawn: str | None) -> str:
-    """`with the secret seed 0123456789abcdef`, or `without a secret seed`."""
+    """Return `with the secret seed 0123456789abcdef`, or `without a secret seed`."""
     return f"with the secret seed {drawn}" if drawn else "without a secret seed"

@@ -1,4 +1,4 @@
-"""Facts about one setting of a trial, and the check of its values."""
+"""Properties of one setting of a trial, and the check of its values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -13,10 +13,10 @@ from apo_bench.io import UNSHOWN
 @final
 @dataclass(frozen=True)
 class SettingInfo:
-    """One setting, as the command line, files and records have it; a number there, times `scale`, is that in Python."""
+    """One setting on the command line, in files, in records and in Python; `scale` converts option values to Python."""
 
     help: str = ""
-    """Of its option, without default and full stop; empty if it has none."""
+    """Help text of its option, without default and full stop; empty if the setting has no option."""
     choices: tuple[str, ...] = ()
     spelled: Callable[[str], str] | None = None
     """Checks a name and returns its canonical form."""
@@ -24,22 +24,22 @@ class SettingInfo:
     """Command-line option without leading dashes; default: the name of the setting."""
     scale: float = 1.0
     usual: str = ""
-    """What help says of the default; the default itself if empty."""
+    """Text about the default in the help; empty for the default itself."""
     key: bool = False
-    """Whether it distinguishes the trials of one sweep."""
+    """Whether it belongs to the key that distinguishes the trials of one sweep."""
     axis: bool = False
-    """Whether a sweep may have several values of it."""
+    """Whether it may have several values in a sweep."""
     swept: tuple[Any, ...] = ()
-    """Default values of a sweep; default: the default of a trial."""
+    """Default values in a sweep; empty: the default of a trial."""
     shared: bool = False
-    """Whether all trials of a sweep have the same."""
+    """Whether all trials of a sweep have the same value."""
     scene: bool = False
     """Whether the compiled scene depends on it."""
     drawn: bool = False
-    """Whether it is of a random draw: null in the record of an observation from a file."""
+    """Whether it determines a random draw, so that it is null in the record of an observation from a file."""
     name: str = ""
     kind: Any = None
-    """The type of the setting, with the range that it may have."""
+    """Type of the setting, with its range."""
     default: Any = None
 
     @property
@@ -49,7 +49,7 @@ class SettingInfo:
 
     @property
     def keyword(self) -> str:
-        """The option as an argument, or as a key of a file."""
+        """The name of the option as an argument of a function, or as a key of a file."""
         return self.option.replace("-", "_")
 
     @property
@@ -61,17 +61,18 @@ class SettingInfo:
         return getattr(self.kind, "__origin__", self.kind) is int
 
     def check(self, value: object, called: str = "") -> None:
-        """Raise an `InputError` unless the setting may have this value, whatever the others are.
+        """Raise an `InputError` unless the setting may have this value, whatever the other settings are.
 
         Args:
-            called: The setting in the message. Default: its name.
+            called: Name of the setting in the message; default: its own.
         """
         name = called or self.words
-        limits = getattr(self.kind, "__metadata__", (None,))[0]
+        limits = getattr(self.kind, "__metadata__", (None,))[0]  # range of a number
         if self.choices:
             require_known(name, value if isinstance(value, str) else shown(value), self.choices)
         elif self.is_text:
             require_text(name, value)
+            # scenario names are checked when they are loaded
             is_shown = self.name == "scenario" or not UNSHOWN.search(str(value))
             require(is_shown, f"{name} must not have control characters or half letters, got {value!r}.")
         elif limits is not None and limits.ge is not None:
@@ -82,5 +83,5 @@ class SettingInfo:
 
 
 def about(help: str = "", **more: Any) -> Mapping[str, Any]:
-    """The metadata of a field that is a setting; `more` as in `SettingInfo`."""
+    """Return the metadata of a dataclass field that is a setting; `more` are fields of `SettingInfo`."""
     return {"info": SettingInfo(help, **more)}

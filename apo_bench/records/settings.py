@@ -1,4 +1,4 @@
-"""The settings of a trial, each stated once: columns, sweep axes, file keys, options and tables are made from them."""
+"""The settings of a trial, each stated once: columns, sweep axes, file keys, options and tables derive from them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -29,12 +29,12 @@ USUAL = "isotropic"
 Fidelity = Literal["full", "near-contact"]
 NEAR_CONTACT = "near-contact"
 LARGEST_SEED = 2**53 - 1
-"""The largest integer that every JSON reader keeps exactly."""
+"""The largest integer that every JSON reader keeps exact."""
 LONGEST_NAME = 5000
-"""Characters; some names are paths."""
+"""Most characters of a name; some names are paths."""
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 NoiseSize = Annotated[float, Meta(ge=0.0, le=50.0)]
-"""[mm] or [deg]: at five standard deviations of the largest, parts are still inside the room."""
+"""[mm] or [deg]; five standard deviations of the largest noise are still inside the space that observations cover."""
 HumanErrorScale = Annotated[float, Meta(ge=0.0, le=10.0)]
 ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
 Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
@@ -50,7 +50,7 @@ NOISE_LEVEL = SettingInfo(
     name="noise_level",
     kind=NoiseSize,
 )
-"""One number stands for `noise_mm` and `noise_deg`."""
+"""A setting of sweeps and commands that sets `noise_mm` and `noise_deg`."""
 
 
 @final
@@ -198,7 +198,7 @@ class TrialConfig:
             axis=True,
         ),
     )
-    """How often a corrector that asks for it may observe operations again, with the noise of the first observation."""
+    """How often a corrector that requests it may observe operations again, with the noise of the first observation."""
     ft_sensor: Name = field(
         default=USUAL_FT_SENSOR,
         metadata=about(
@@ -231,15 +231,15 @@ class TrialConfig:
             axis=True,
         ),
     )
-    """A plan with a lower `predicted_success` is not executed and does not count as a success."""
+    """A plan with a lower `predicted_success` is not executed, and does not count as a success."""
     seed: Seed = field(default=0, metadata=about("Number of the trial", key=True))
-    """Number of the trial: all methods meet the same layout, demonstration and noise at the same seed."""
+    """Number of the trial: at the same seed, all methods have the same layout, demonstration and noise."""
     secret_seed: SecretSeed | None = field(
         default=None,
         repr=False,
         metadata=about("File with the secret seed of the sweep", option="secret-seed-file", usual="none", drawn=True),
     )
-    """Enters every random stream; None for a trial that anyone can draw. A record has its hash."""
+    """Secret that enters every random stream; None for a trial that anyone can draw. A record has its hash."""
     timestep_s: TimestepS = field(
         default=0.001,
         metadata=about(
@@ -265,7 +265,7 @@ class TrialConfig:
         for info in SETTINGS.values():
             value = getattr(self, info.name)
             if isinstance(value, np.generic):
-                value = value.item()
+                value = value.item()  # a number of NumPy
             info.check(value)
             object.__setattr__(self, info.name, info.spelled(value) if info.spelled else value)
         check_together(self.fidelity, self.grasp)
@@ -277,6 +277,7 @@ class TrialConfig:
 
 
 def _settings() -> Iterable[SettingInfo]:
+    """Yield the settings with name, type, default and option from the fields of `TrialConfig`."""
     kinds = get_type_hints(TrialConfig, include_extras=True)
     for setting in fields(TrialConfig):
         name = setting.name
@@ -290,16 +291,16 @@ SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
 
 
 def check(name: str, value: object, called: str = "") -> None:
-    """Raise an `InputError` unless a setting may have this value, whatever the others are.
+    """Raise an `InputError` unless a setting may have this value, whatever the other settings are.
 
     Args:
-        called: The setting in the message. Default: its name.
+        called: Name of the setting in the message; default: its own.
     """
     SETTINGS[name].check(value, called)
 
 
 def check_together(fidelity: str, *grasps: str) -> None:
-    """Raise an `InputError` unless the verdicts of a fidelity are known to be those of `full` with these grasps."""
+    """Raise an `InputError` for grasps with which the verdicts of a fidelity differ from those of `full`."""
     require(
         fidelity != NEAR_CONTACT or "weld" not in grasps,
         "the fidelity 'near-contact' was given together with the grasp 'weld', with which its verdicts differ; "
@@ -308,7 +309,7 @@ def check_together(fidelity: str, *grasps: str) -> None:
 
 
 def check_grip(probes: bool, *grasps: str) -> None:
-    """Raise an `InputError` if a robot that probes, which aligns parts between its pads, has no pads that close."""
+    """Raise an `InputError` if a robot that probes has no pads that close, between which it aligns parts."""
     require(
         not probes or "weld" not in grasps,
         "the grasp 'weld' was given for a method with +probe, which aligns parts between pads that close; use the "
@@ -317,11 +318,16 @@ def check_grip(probes: bool, *grasps: str) -> None:
 
 
 def parse_noise_level(noise_level: float | Sequence[float], pose_source: str = NOISE_MODEL) -> tuple[float, float]:
-    """A noise level in mm and in degrees: one number stands for both, a pair for each; per ray it is one, in mm."""
+    """Return a noise level in mm and in degrees.
+
+    One number stands for both, and a pair for each. With the depth camera there is one number, in mm per ray, and 0
+    degrees.
+    """
     is_several = isinstance(noise_level, Iterable) and not isinstance(noise_level, str)
     several: tuple[Any, ...] = tuple(noise_level) if is_several else (noise_level,)  # type: ignore[arg-type]
     per_ray = pose_source == DEPTH_CAMERA
     allowed = "one number, mm per ray" if per_ray else "one number, or a pair of mm and degrees"
+    # a bool counts as 0 or 1
     require(1 <= len(several) <= 2 - per_ray, f"noise level must be {allowed}, got {noise_level!r}.")
     check("noise_mm", several[0], "noise level")
     check("noise_deg", several[-1], "noise level")
@@ -329,7 +335,7 @@ def parse_noise_level(noise_level: float | Sequence[float], pose_source: str = N
 
 
 def refuse_noise(*noises: object) -> None:
-    """Raise an `InputError` if there is a noise model; for pose sources that draw no noise."""
+    """Raise an `InputError` if a noise model is given for a pose source that draws no pose noise."""
     names = ", ".join(noise for noise in noises if isinstance(noise, str))
     require(
         not noises,

@@ -12,8 +12,8 @@ from apo_bench.simulation.arms.arm import Arm
 def describe_arm(arm: Arm) -> str:
     """Describe an arm: `6 joints, opens 85.6 mm, 44 N a pad, payload 5 kg; position servos made from the model`."""
     hand = f", {arm.hand.force_n:.0f} N a pad" if arm.hand is not None else ""
-    # opening_m is the opening of each finger
     payload = f", payload {arm.limits.payload_kg:g} kg" if arm.limits.payload_kg is not None else ""
+    # opening_m is the opening of each finger
     return f"{len(arm.joints)} joints, opens {2e3 * arm.opening_m:.1f} mm{hand}{payload}; {arm.control}"
 
 

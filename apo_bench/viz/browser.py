@@ -1,4 +1,4 @@
-"""A rollout in a browser, by viser, with a slider and buttons; served to this machine only."""
+"""Serve a rollout to a browser by viser, with a slider and buttons; only this machine can connect."""
 
 import io
 import time
@@ -22,19 +22,20 @@ from apo_bench.viz.stepping import start_at_end
 HOST = "127.0.0.1"
 PORT = 8080
 _FOV_RAD = np.radians(45.0)  # as in films
-_BESIDE_PANEL = 0.12  # so far right of the assembly the camera looks, over its distance: the panel hides the right side
-_NEARER = 0.8  # over the distance in films, which show the gripper above the assembly
+# the camera aims this share of its distance to the right of the assembly, since the panel hides the right side
+_BESIDE_PANEL = 0.12
+_NEARER = 0.8  # distance of the camera over that in films, which also show the gripper above the assembly
 _BUTTONS = (
     {"play / stop": "play", "moment back": "previous", "moment on": "next"},
     {"operation back": "previous operation", "operation on": "next operation"},
     {"demonstration": "previous segment", "replay": "next segment"},
     {"names of faces": "faces", "target poses": "goals"},
 )
-"""Label -> key of `Cursor.press`."""
+"""One dictionary per group of buttons: label -> key of `Cursor.press`."""
 
 
 def no_browser() -> str:
-    """Why nothing can be shown in a browser, empty where it can."""
+    """Return why no browser can be used; empty if one can."""
     if find_spec("viser") is None:
         return 'viser is not installed; install it with: pip install "apo_bench[view]"'
     return ""
@@ -46,7 +47,9 @@ def serve_rollout(
     """Serve a rollout until `ends` returns true, or Ctrl-C.
 
     Args:
-        say: Prints the address.
+        port: TCP port on this machine.
+        say: Called once with a sentence that states the address.
+        ends: Called before each update of the page.
 
     Raises:
         InputError: The port is taken or not allowed.
@@ -66,14 +69,14 @@ def serve_rollout(
 
 
 class Page:
-    """The page that one or several browsers show; they share one place in the rollout."""
+    """The page that browsers show; all browsers share one position in the rollout."""
 
     def __init__(self, rollout: Rollout, port: int) -> None:
         self.cursor = start_at_end(rollout)
-        self._requests = deque[str | int]()
+        self._requests = deque[str | int]()  # keys to press, or numbers of moments to go to
         self._data = make_initial_state(rollout.scene.work, rollout.segments[0].start)
         self._server = _server(port)
-        self._drawn: object = None
+        self._drawn: object = None  # the state that the page shows now
         self._shown: dict[tuple[ShapeKind, int], Any] = {}
         self.address = f"http://{HOST}:{self._server.get_port()}"
         self._aim_camera(rollout)
@@ -84,12 +87,12 @@ class Page:
             self._server.stop()
 
     def draw(self) -> None:
-        """Do what the browser requested, and update the page if anything changed."""
+        """Process the requests of the browser, and update the page if anything changed."""
         while self._requests:
             request = self._requests.popleft()
             if isinstance(request, str):
                 self.cursor.press(request)
-            elif not self.cursor.playing:
+            elif not self.cursor.playing:  # while playing, the slider is moved by the page itself
                 self.cursor.go(request)
         state = (self.cursor.place, self.cursor.faces, self.cursor.shows_goals)
         if state == self._drawn:
@@ -100,9 +103,11 @@ class Page:
             for kind, at in shapes_of(self.cursor.rollout.scene, self._data, snapshot):
                 handle = self._handle(kind, count[kind])
                 count[kind] += 1
+                # viser orders position and quaternion as (x, y, z), (w, x, y, z)
                 if not np.array_equal(at, (*handle.position, *handle.wxyz)):
                     handle.position = at[:3]
                     handle.wxyz = at[3:]
+            # hide the shapes that this moment does not have
             for (kind, number), handle in self._shown.items():
                 if handle.visible != (number < count[kind]):
                     handle.visible = number < count[kind]
@@ -111,7 +116,7 @@ class Page:
         self._drawn = state
 
     def _handle(self, kind: ShapeKind, number: int) -> Any:
-        """What viser draws of a shape; made when a shape of its kind first appears."""
+        """Return the viser object of the shape of this kind with this number; make it when it first appears."""
         if (kind, number) not in self._shown:
             name = f"/{len(self._shown)}"
             if kind.label:

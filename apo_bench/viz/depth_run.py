@@ -79,9 +79,8 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
 def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
     """Return a run as a JSON object: operations from 1, errors of the depth camera without those of the human."""
     operations = []
-    events = {
-        event.operation: event for event in run.events
-    }  # unexpected events have operation None and are not looked up
+    # unexpected events have operation None and are not looked up
+    events = {event.operation: event for event in run.events}
     for k, operation in enumerate(run.simulated.demonstration.assembly.operations):
         event = events.get(k)
         form = {"operation": k + 1, "moves": list(operation.moves), "found": False}

@@ -31,15 +31,13 @@ def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
     rows = []
     for o in explanation.operations:
         free = []
-        for along, some in group_by(
-            (direction.along, direction) for direction in o.free
-        ).items():  # shared directions are grouped by the operations that move along
+        # shared directions are grouped by the operations that move along
+        for along, some in group_by((direction.along, direction) for direction in o.free).items():
             names = ", ".join(f"{each.direction} {format_deviation(each)}" for each in some)
             others = dict.fromkeys(explanation.operations[j].part for j in along)
             free.append(f"{names}{' with ' * bool(others)}{', '.join(others)}")
-        until = {
-            hold.relation: "" if hold.lost is None else f" until {hold.lost + 1}" for hold in o.through
-        }  # a relation that is lost later holds `until` that operation
+        # a relation that is lost later holds `until` that operation
+        until = {hold.relation: "" if hold.lost is None else f" until {hold.lost + 1}" for hold in o.through}
         rows.append(
             {
                 "operation": o.operation + 1,

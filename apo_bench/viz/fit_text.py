@@ -85,7 +85,7 @@ def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
-    """Return the Kolmogorov-Smirnov distance of each fit, with the distance that chance exceeds rarely."""
+    """Return a line per fit: its Kolmogorov-Smirnov distance, and the 95 % quantile of that for a correct fit."""
     return [
         f"{name}: Kolmogorov-Smirnov {of['kolmogorov_smirnov']:.3f}, by chance below "
         f"{of['kolmogorov_smirnov_by_chance']:.3f}"

@@ -104,9 +104,8 @@ def _draw_arrow(axes: Any, upper: Place, lower: Place, color: str, style: Any, l
 
 def _draw_node(axes: Any, node: Node, at: Place, face: Any, stands: bool) -> None:
     """Draw a box with the part's name and ODL; dashed and white if the part has moved on from there."""
-    terms = (
-        f"T_{{{k + 1}}}{'^{-1}' if inverse else ''}" for k, inverse in node.odl
-    )  # operations of an ODL count from 1 on the page
+    # operations of an ODL count from 1 on the page
+    terms = (f"T_{{{k + 1}}}{'^{-1}' if inverse else ''}" for k, inverse in node.odl)
     odl = "$" + (r"\,".join(terms) or "T_0") + "$"
     ink, line = (_INK, "-") if stands else (_GONE, _DASHES)
     box = {"boxstyle": "round,pad=0.4", "facecolor": face if stands else "white", "edgecolor": ink, "linestyle": line}

@@ -61,7 +61,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
     variances = []
     for _ in range(_DRAWS):
         observation = observe(demonstration, noise, rng)
-        # rotate the error twist xi of T Exp(xi) from the part's frame to the ray's: Q has R_ray^T R_part twice on its diagonal
+        # rotate the error twist xi of T Exp(xi) from the part's frame to the ray's: the blocks of Q are R_ray^T R_part
         Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.poses), 1, 2) @ observation.poses[:, :3, :3])
         xi = (Q @ pose.log(pose.inverse(demonstration.poses) @ observation.poses)[..., None])[..., 0]
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
@@ -120,7 +120,7 @@ def _tabulate(sample: ErrorSample) -> Iterator[str]:
 def _resolve_model(model: Any) -> Any:
     """Return the class or object of a noise model's name.
 
-    Measured and failure models are made at noise level 1, since their facts do not depend on the level.
+    Measured models and camera failures are made at noise level 1; other models stay classes or objects.
     """
     known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
     return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

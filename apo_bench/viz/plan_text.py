@@ -1,7 +1,7 @@
-"""A plan step by step: one line for each operation, and one JSON object.
+"""A plan step by step: one table line for each operation, and one JSON object.
 
-Directions are those of the frame of the assembly at the nominal poses. Only the last column depends on the target
-poses, so another pose changes the line of its operation and no other.
+Directions are in the frame of the assembly at its nominal poses. Only the last column depends on the target poses, so
+another pose changes the line of its operation and no other.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,28 +23,30 @@ _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "wa
 
 
 class PlanLine(NamedTuple):
-    """One step of the schedule."""
+    """One step of the schedule: an operation, done or undone."""
 
     operation: int
     """Counted from 0."""
     undo: bool
     what: OperationMacros
     came_from: str
-    """The ODL of where the main part is taken from, or `start`."""
+    """The ODL of the place that the main part is taken from, or `start`."""
     relations: tuple[str, ...]
-    """The relations that the step makes: R1, R2, .."""
+    """The relations that the step makes, or makes again if it undoes an operation: R1, R2, .."""
     grasp: Grasp
     target: Array | None
-    """(4, 4), world, [m]; None of an undone operation, whose part goes back to where it was."""
+    """Target pose of the main part, (4, 4), world, [m]; None for an undone operation."""
     back_to: str
-    """The ODL of that place; empty otherwise."""
+    """The ODL of the place that an undone operation returns the part to; empty otherwise."""
 
     @property
     def leaves(self) -> Arrival:
+        """How the part leaves its place."""
         return self.what.after if self.undo else self.what.before
 
     @property
     def comes(self) -> Arrival:
+        """How the part arrives at its new place."""
         return self.what.before if self.undo else self.what.after
 
     @property
@@ -53,14 +55,14 @@ class PlanLine(NamedTuple):
 
     @property
     def trouble(self) -> str:
-        """What is wrong with the insertion axis; empty if nothing is."""
+        """A sentence on why no straight insertion leads to the place; empty if one does."""
         if self.comes.chain.locked:
             return "locked: no straight motion leads there"
         return "" if self.comes.free else "no free insertion axis"
 
 
 def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
-    """The steps of a plan."""
+    """Return the steps of a plan, with macros computed at the nominal poses of the scenario."""
     everything = list_nominal_operations(scenario)
     odls = plan.assembly.odls()
     relations = [plan.assembly.relations()[arc[0]] for arc in plan.assembly.arcs()]
@@ -68,6 +70,7 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     for (k, undo), T in zip(plan.schedule, plan.step_poses, strict=True):
         main = everything[k].main
         before = spell(odls[k - 1][main]) if k and main in odls[k - 1] else "start"
+        # relations are numbered by arcs; an undone operation makes those that it had ended
         made = tuple(f"R{i}" for i, of in enumerate(relations, start=1) if (of.lost if undo else of.made) == k)
         came_from, target, back_to = (f"T{k + 1}", None, before) if undo else (before, T, "")
         lines.append(PlanLine(k, undo, everything[k], came_from, made, scenario.grasps[k], target, back_to))
@@ -75,22 +78,22 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
 
 
 def plan_text(lines: Sequence[PlanLine]) -> list[str]:
-    """A table of text, then what is wrong with single operations."""
+    """Return an aligned table, followed by a sentence for each operation without a free insertion axis."""
     wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
     return [*align_columns([_HEADS, *map(_cells, lines)]), *([""] if wrong else []), *wrong]
 
 
 def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
-    """The JSON object: mm, degrees, operations from 1.
+    """Return a plan as a JSON object: mm, degrees, operations from 1.
 
     Args:
-        notes: Assumptions, and what speaks against the plan.
+        notes: Assumptions of the plan and objections to it, one sentence each.
     """
     start = find_nominal_start(scenario)
     stages = (start, *compute_placements(scenario.assembly, start, scenario.nominal_poses))
     forms = []
     for line in lines:
-        stage = stages[line.operation if line.undo else line.operation + 1]
+        stage = stages[line.operation if line.undo else line.operation + 1]  # where the parts stand after the step
         screw = turning_state(scenario.assembly, line.comes, stage)
         position, guarded, across = (axes.tolist() for axes in line.comes.axes)
         target = {"position_mm": None, "quaternion_wxyz": None} if line.target is None else pose_form(line.target)
@@ -121,7 +124,11 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
     return {"schema": _SCHEMA, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
 
 
+"""Format a step as the cells of `_HEADS`."""
+
+
 def _cells(line: PlanLine) -> tuple[str, ...]:
+    # main part, and the parts that it carries
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
     macros = []
     for macro in line.macros:
@@ -148,7 +155,7 @@ def _cells(line: PlanLine) -> tuple[str, ...]:
 
 
 def _list_axes(vectors: Iterable[Array]) -> str:
-    """Axes without their sign."""
+    """Format axes without their sign; `-` if there are none."""
     return " ".join(format_direction(v).lstrip("+-") for v in vectors) or "-"
 
 

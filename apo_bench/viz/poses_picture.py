@@ -37,7 +37,7 @@ class PosesPanel(NamedTuple):
     gap_m: float
     """The largest residual |e| of all contacts, [m]."""
     open: tuple[str, ...]
-    """Contacts that do not hold: `R4 stick -> castle2: 1.31 mm`, worst first; then `R1 castle1 -> table: no overlap`."""
+    """Open contacts: `R4 stick -> castle2: 1.31 mm`, worst first, then `R1 castle1 -> table: no overlap`."""
     warning: str = ""
     """Result of the consistency test and the failure prediction; empty if there is none."""
 

@@ -131,7 +131,7 @@ def _laid(t: Transfer, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any]
     averaged = lay_flat.averaged_s(t.flat, filtered)
     if averaged > lay_flat.LONGEST_S:
         return None
-    # an arriving part that leaves no contact has its first grip; after a departure the grip has been changed once
+    # a part that is regrasped while it is pulled out is then held by its second grip
     grip = t.grips[0 if t.out.left is None else 1]
     foot = pose.apply(t.flat.T, t.flat.feet[:1])[0]
     return {

@@ -149,9 +149,8 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]
     # the first motion along the insertion axis has its travel; others have the length of their macro
     along = next((i for i, way in enumerate(ways) if way @ axis > _ALONG), None)
-    for i, (macro, way) in reversed(
-        list(enumerate(zip(macros, ways, strict=True)))
-    ):  # from the goal backwards, since only the last pose is known
+    # from the goal backwards, since only the last pose is known
+    for i, (macro, way) in reversed(list(enumerate(zip(macros, ways, strict=True)))):
         end = begin
         begin = _shift(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
         motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))

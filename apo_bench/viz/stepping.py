@@ -1,4 +1,4 @@
-"""The place of a person who steps through a rollout, and what is shown there, in a window and in a browser."""
+"""Step through a rollout: a cursor at one moment, and what a window or a browser shows there."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ _COLORS: dict[str, tuple[str, Color]] = {
     AS_CORRECTED: ("green", (0.15, 0.7, 0.3)),
     AS_TRUE: ("violet", (0.55, 0.35, 0.85)),
 }
-"""Poses -> name and value of their colour."""
+"""Name of target poses -> name of their colour, and RGB in 0..1."""
 
 
 @final
 @dataclass(eq=False)
 class Cursor:
-    """A moment of a rollout, whose segments follow each other; methods move it, `snapshot` shows what is there."""
+    """A position in a rollout, whose segments follow each other; methods move it, `snapshot` describes what to show."""
 
     rollout: Rollout
     place: int = 0
-    """Number of the moment, from 0, through all segments."""
+    """Number of the moment, from 0, counted through all segments."""
     playing: bool = False
     faces: Faces = "this operation"
     shows_goals: bool = False
-    _played_s: float = 0.0
+    _played_s: float = 0.0  # time of playback in the segment, at or after that of the moment shown
 
     def __post_init__(self) -> None:
         self.places = [(segment, moment) for segment in self.rollout.segments for moment in segment.moments]
@@ -53,18 +53,18 @@ class Cursor:
         return self.moment is self.segment.moments[-1]
 
     def snapshot(self) -> FilmSnapshot:
-        """What is shown here."""
+        """Return everything that is shown at this moment."""
         return FilmSnapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
 
     def press(self, key: str) -> None:
-        """Do what a key means, one of `WINDOW_KEYS`."""
+        """Execute a key, one of `WINDOW_KEYS`."""
         way, _, what = key.partition(" ")
         if key == "play":
             self.playing = not self.playing
-            if self.playing and self._is_last:
+            if self.playing and self._is_last:  # at its end a segment starts again
                 self.go(self.place - len(self.segment.moments) + 1)
         elif key == "faces":
-            self.faces = FACES[(FACES.index(self.faces) + 1) % len(FACES)]
+            self.faces = FACES[(FACES.index(self.faces) + 1) % len(FACES)]  # the next choice, cyclically
         elif key == "goals":
             self.shows_goals = not self.shows_goals
         elif what == "operation":
@@ -75,24 +75,24 @@ class Cursor:
             self.go(self.place + (1 if way == "next" else -1))
 
     def go(self, place: int) -> None:
-        """Go to a moment by its number; beyond an end to the end."""
+        """Go to the moment with this number, limited to the first and the last."""
         self.place = min(max(place, 0), len(self.places) - 1)
         self._played_s = self.moment.time_s
 
     def pass_time(self, seconds: float) -> None:
-        """Play on in real time, up to the end of the segment."""
+        """Advance by so many seconds of real time if it plays, at most to the end of the segment."""
         self._played_s += seconds
         while self.playing and not self._is_last and self.places[self.place + 1][1].time_s <= self._played_s:
             self.place += 1
         self.playing = self.playing and not self._is_last
 
     def words(self) -> tuple[str, ...]:
-        """The phase, the force, how far target poses and the part are from the true pose; at the end, the result."""
+        """Return the lines of text: phase, force, offsets from the true pose; at the end of a segment, the result."""
         moment = self.moment
         ending = self.segment.ending
         k = moment.phase.operation
         words = [f"{moment.time_s:.2f} s, {operation_words(self._assembly, moment)}"]
-        if ending and self.segment.world is self.rollout.scene.work:
+        if ending and self.segment.world is self.rollout.scene.work:  # only the replay measures a force
             words.append(f"force {moment.phase.force_n:.1f} N")
         if k is not None:
             words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
@@ -103,7 +103,7 @@ class Cursor:
         return tuple(words)
 
     def _offsets(self, k: int) -> list[str]:
-        """How far poses and the part are from the true pose of an operation, in its own frame."""
+        """Return the distances of target poses and of the part from the true pose of operation k, in its frame."""
         if AS_TRUE not in self.rollout.poses:
             return []
         placed = {name: poses[k] for name, poses in self.rollout.poses.items()}
@@ -117,7 +117,12 @@ class Cursor:
         return lines
 
     def _jump(self, groups: Sequence[Hashable], way: str) -> None:
-        """Go to the first moment of the next or the previous group; `groups` has that of each moment."""
+        """Go to the start of the next group, or to the last start before this moment.
+
+        Args:
+            groups: The group of each moment; equal neighbours form one group.
+            way: `next`, else back.
+        """
         begins = [i for i in range(len(groups)) if i == 0 or groups[i] != groups[i - 1]]
         if way == "next":
             self.go(next((i for i in begins if i > self.place), len(groups)))
@@ -125,6 +130,7 @@ class Cursor:
             self.go(max((i for i in begins if i < self.place), default=0))
 
     def _faces(self) -> tuple[PartFace, ...]:
+        """Return the faces to name: all, or those of the contacts of the current operation, or none."""
         k = self.moment.phase.operation
         if self.faces == "all":
             solids = self._assembly.solids.items()
@@ -133,7 +139,7 @@ class Cursor:
         return tuple(dict.fromkeys(of for contact in contacts for of in contact))
 
     def _overlays(self) -> tuple[Overlay, ...]:
-        """The parts that moved up to here, where target poses put them."""
+        """Return the parts that have moved up to now, at the poses where each set of target poses places them."""
         k = self.moment.phase.operation
         if k is None or not self.shows_goals:
             return ()
@@ -147,7 +153,7 @@ class Cursor:
 
 
 def start_at_end(rollout: Rollout) -> Cursor:
-    """Return a cursor at the last moment, where the assembly and the outcome are seen, without names of faces."""
+    """Return a cursor at the last moment, which shows the assembly and the outcome, without names of faces."""
     cursor = Cursor(rollout, faces="none")
     cursor.go(len(cursor.places))
     return cursor

@@ -1,4 +1,4 @@
-"""The task sheet of a scenario in Markdown."""
+"""The task sheet of a scenario in Markdown: operations, human error, layout, and success criteria."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -15,10 +15,10 @@ from apo_bench.viz.form_text import format_value
 
 
 def task_sheet(scenario: Scenario, level: int = 1) -> str:
-    """Describe a scenario in Markdown.
+    """Return the task sheet of a scenario in Markdown.
 
     Args:
-        level: Level of its heading, from 1.
+        level: Level of the heading, from 1.
     """
     facts = {
         "In the paper": scenario.paper,
@@ -35,14 +35,14 @@ def task_sheet(scenario: Scenario, level: int = 1) -> str:
 
 
 def _describe_parts(scenario: Scenario) -> Iterator[str]:
-    """`table (fixed)`, `B (block)`."""
+    """Yield each part with notes: `table (fixed)`, or `B (block)` if its file has another name."""
     for name, path in scenario.part_files.items():
         notes = ["fixed"] * (name in scenario.assembly.fixed) + [path.stem] * (path.stem != name)
         yield f"{name} ({', '.join(notes)})" if notes else name
 
 
 def _describe_operations(scenario: Scenario) -> Iterator[str]:
-    """`5. stick: R6 stick -> cube2 (py-hpy, ...), R7 ...; ends R2`."""
+    """Yield a line for each operation: `5. stick: R6 stick -> cube2 (py-hpy, ...), R7 ...; ends R2`."""
     graph = build_relation_graph(scenario.assembly)
     for k, operation in enumerate(scenario.assembly.operations):
         made = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in graph.arcs if arc.made == k)
@@ -52,13 +52,14 @@ def _describe_operations(scenario: Scenario) -> Iterator[str]:
 
 
 def _describe_human_error(scenario: Scenario) -> str:
+    """Describe the displacement of the human error, and the later operations that it displaces too."""
     error = scenario.human_error
     if error is None:
         return "none"
-    # a displaced face leads later operations astray
+    # parts placed on a displaced face are displaced as well
     offsets = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), error.axis).offsets
     mains = [operation.main for operation in scenario.assembly.operations]
-    astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)
+    astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)  # numbers of operations from 0
     followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
     follow = f"; {join_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
     return (
@@ -68,6 +69,7 @@ def _describe_human_error(scenario: Scenario) -> str:
 
 
 def _describe_variations(scenario: Scenario) -> Iterator[str]:
+    """Describe how layouts vary: place and rotation of the assembly, then shifts and turns of single operations."""
     site = scenario.site
     x, y = (f"{c * 1e3:g} ± {s * 1e3:g}" for c, s in zip(site.center_m, site.spread_m, strict=True))
     low, high = np.degrees(site.yaw_rad)
@@ -82,9 +84,10 @@ def _describe_variations(scenario: Scenario) -> Iterator[str]:
 
 
 def _describe_verdict(scenario: Scenario) -> dict[str, str]:
-    """What the judge uses, as far as it is not the default."""
+    """Describe the criteria of success as far as they differ from the defaults; empty texts are not printed."""
     thresholds = scenario.thresholds
     changed = dict(asdict(thresholds).items() - asdict(Thresholds()).items())
+    # in allowed gaps the fit margin is added to the play
     wider = (f"{contact} {play + thresholds.fit_margin_mm:.2f} mm" for contact, play in sorted(_list_wider(scenario)))
     return {
         "Verdict": "as demonstrated" if scenario.success_means == "as_demonstrated" else "",
@@ -96,7 +99,7 @@ def _describe_verdict(scenario: Scenario) -> dict[str, str]:
 
 
 def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    """Contacts whose play is larger than the clearance, and their play [mm], at the nominal poses."""
+    """Yield contacts whose play at the nominal poses is larger than the clearance, with that play [mm]."""
     assembly = scenario.assembly
     history = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     for contact, operation, _ in assembly.relations():
@@ -110,13 +113,13 @@ def _format_span(low_m: float, high_m: float) -> str:
 
 
 def _through(turn: Turn) -> str:
-    """` through (-30, 0, 0) mm`, unless that is the origin of the part."""
+    """Return the point of a turn, ` through (-30, 0, 0) mm`; empty if it is the origin of the part."""
     return f" through ({', '.join(f'{1e3 * x:g}' for x in turn.point)}) mm" if turn.point.any() else ""
 
 
 def _name_axis(axis: Array) -> str:
-    """`its x axis`, of the part at its nominal pose."""
+    """Name an axis, (3,), in the frame of the part at its nominal pose: `its x axis`, or `its direction (...)`."""
     i = int(np.argmax(np.abs(axis)))
-    if abs(axis[i]) > 1 - 1e-9:
+    if abs(axis[i]) > 1 - 1e-9:  # along a coordinate axis
         return f"its {'-' if axis[i] < 0 else ''}{'xyz'[i]} axis"
     return f"its direction ({', '.join(f'{a:.3g}' for a in axis)})"

@@ -1,4 +1,4 @@
-"""A finished trial of a sweep, run again."""
+"""Run a finished trial of a sweep again from its record."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,13 +20,16 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
     """Run a trial of a sweep again.
 
     Args:
-        folder: Of the sweep.
+        folder: Folder of the sweep.
         number: Line of the trial in `trials.jsonl`, from 1; None: the first failure, or the first trial.
-        secret_seed_file: Of a sweep with a secret seed.
+        secret_seed_file: File of the secret seed, if the sweep has one.
+
+    Returns:
+        The record of the repeated trial, and its rollout.
 
     Raises:
         InputError: There is no such trial.
-        RuntimeError: It would not be the same trial, or the robot did not replay anything.
+        RuntimeError: The trial would differ from the recorded one, or the robot did not replay anything.
     """
     number, record = _choose_trial(folder, number)
     if code := own_code(record):
@@ -38,6 +41,7 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
     config = restore_settings(record, scenario_files(read_run(folder)).get(name, name))
     if secret_seed_file is not None:
         config = replace(config, secret_seed=read_secret_seed(secret_seed_file))
+    # the hash shows whether the same files and version are used
     content = content_hash(load_scenario(config.scenario), config.scenario, find_arm(config.arm).files)
     if config_hash(config, content) != record.get("config_hash"):
         secret = record.get("secret_seed") is not None and config.secret_seed is None
@@ -53,12 +57,14 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
 
 
 def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
+    """Return line number and record of the trial; None chooses the first replayed failure, else the first trial."""
     path = folder / "trials.jsonl"
     first = None
     count = 0
     for count, line in read_lines(path, "table of trials"):
         if number in (None, count):
             record = record_of(line, f"{path}, line {count}")
+            # sim_time_s is None if nothing was replayed
             if number is not None or (record["success"] is False and record["sim_time_s"] is not None):
                 return count, record
             first = first or (count, record)

@@ -1,4 +1,4 @@
-"""The six lines of a trial that answer a person."""
+"""The six lines that `apo-bench run` prints about a trial."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -9,12 +9,12 @@ from apo_bench.records import SETTINGS, TrialRecord, probes
 from apo_bench.records.run.replay_command import replay_command
 
 Line = tuple[str, str]
-"""Name and text."""
+"""Name and text of a line."""
 _IF_UNUSUAL = (
     *("pose_source", "noise", "contact_source", "max_reobservations", "robot_error", "min_predicted_success"),
     *("ft_sensor", "assumed_robot_error"),
 )
-"""Settings that are named where they differ from their default; only a robot that probes uses the last two."""
+"""Settings that are printed if they differ from their default; the last two only for a robot that probes."""
 _DECISIVE: Mapping[str, Line] = MappingProxyType(
     {
         "overlap": ("least overlap", "{least_overlap:.0%} of the true overlap"),
@@ -25,7 +25,7 @@ _DECISIVE: Mapping[str, Line] = MappingProxyType(
         "inconsistent": ("contact gap", "{gap_before_mm:.3f} mm observed"),
     }
 )
-"""Failure code -> the number that explains it."""
+"""Failure code -> name and template of the number that explains the failure."""
 _OTHERWISE: Mapping[str, Line] = MappingProxyType(
     {
         "worst_gap_mm": ("worst gap", "{worst_gap_mm:.3f} mm between faces that should touch"),
@@ -33,15 +33,15 @@ _OTHERWISE: Mapping[str, Line] = MappingProxyType(
         "gap_before_mm": ("contact gap", "{gap_before_mm:.3f} mm observed"),
     }
 )
-"""Column -> the number that explains every other end, of the first column that has a value."""
+"""Column -> name and template of the number for all other outcomes; the first column with a value is printed."""
 
 
 def summary_lines(record: TrialRecord, scenario: str, observation: Path | None = None) -> list[Line]:
-    """What was tried, how it was corrected, how it ended and why, what was predicted, and how to look at it.
+    """Return the six lines: settings, correction, result, decisive number, predicted success, command to view.
 
     Args:
         scenario: Name or file, as the command takes it.
-        observation: File of the observation, if it was measured.
+        observation: File of the observation, if it was measured and not simulated.
     """
     predicted = record.get("predicted_success")
     gaps = [record.get(name) for name in ("gap_before_mm", "gap_after_mm")]
@@ -63,7 +63,7 @@ def summary_lines(record: TrialRecord, scenario: str, observation: Path | None =
 
 
 def _describe_settings(record: TrialRecord) -> Iterator[str]:
-    """`noise level 2`, `human error scale 1`, `seed 5`, then settings that differ from their default."""
+    """Yield `noise level 2`, `human error scale 1`, `seed 5`, then settings that differ from their default."""
     mm, deg = record["noise_mm"], record["noise_deg"]
     if mm is None or deg is None:
         yield "measured observation"
@@ -81,6 +81,7 @@ def _describe_settings(record: TrialRecord) -> Iterator[str]:
 
 
 def _describe_result(record: TrialRecord) -> str:
+    """Describe success, or the stage, code and operation of the failure."""
     if record["success"] is None:
         return "none: the demonstration failed"
     if record["success"]:
@@ -91,9 +92,10 @@ def _describe_result(record: TrialRecord) -> str:
 
 
 def _decisive_line(record: TrialRecord) -> Line:
+    """Return the number that explains the failure code, else the first number of `_OTHERWISE` that is known."""
     try:
         name, text = _DECISIVE[record["failure_code"] or ""]
         return name, text.format_map(record)
-    except (KeyError, TypeError):  # another code, or its number is not known
+    except (KeyError, TypeError):  # another code, or its number is unknown
         name, text = next((line for column, line in _OTHERWISE.items() if record.get(column) is not None), ("", ""))
         return name, text.format_map(record)

@@ -1,4 +1,4 @@
-"""The choice between MuJoCo's window and a browser to step through a rollout."""
+"""Choose between MuJoCo's window and a browser to step through a rollout."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -13,10 +13,10 @@ Display = Literal["window", "browser"]
 
 
 def choose_display(port: int | None) -> Display:
-    """Where a rollout can be shown; commands ask before they run anything.
+    """Choose where a rollout is shown; commands call this before they run anything.
 
     Args:
-        port: Of a browser, if the user names one.
+        port: Port of the browser page; None prefers a window.
 
     Raises:
         InputError: Neither a window nor a browser can show it.
@@ -35,7 +35,12 @@ def choose_display(port: int | None) -> Display:
 
 
 def view(rollout: Rollout, display: Display, port: int | None, say: Callable[[str], None]) -> None:
-    """Show a rollout until a person closes the window, or presses Ctrl-C."""
+    """Show a rollout until the user closes the window, or presses Ctrl-C.
+
+    Args:
+        port: Port of the browser page; None for the default.
+        say: Prints a sentence.
+    """
     try:
         if display == "browser":
             serve_rollout(rollout, PORT if port is None else port, say)

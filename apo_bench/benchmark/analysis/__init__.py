@@ -1,4 +1,4 @@
-"""Rates, paired comparisons, curves: numbers out of trial records."""
+"""Numbers computed from trial records: rates, paired comparisons, curves."""
 
 from apo_bench.benchmark.analysis.calibration import tabulate_calibration
 from apo_bench.benchmark.analysis.condition import (

@@ -1,4 +1,4 @@
-"""Stated uncertainty of corrections, and the contacts that their test suspects, against the truth."""
+"""Compare the stated uncertainty of corrections, and the contacts that their test suspects, with the truth."""
 
 from typing import Any
 
@@ -14,11 +14,11 @@ _AXES = ("scenario", "noise", "contact_source", "method")
 
 
 def tabulate_calibration(records: Records) -> list[Line]:
-    """One line per scenario, noise, contact source and method but the oracle.
+    """Return one line per scenario, noise, contact source and method except the oracle.
 
-    Over every noise level, human error scale and clearance: how often the truth lies in the stated region, the errors
-    of planned poses along directions that contacts fix and leave free, and how often the test fails and names the
-    culprit.
+    Each line covers every noise level, human error scale and clearance. It states how often the truth lies in the 95 %
+    region, the errors of planned poses along directions that contacts fix and leave free, and how often the test fails
+    and suspects the wrong contact.
     """
     trials = trials_of(records)
     counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
@@ -27,18 +27,26 @@ def tabulate_calibration(records: Records) -> list[Line]:
 
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return the sort key of a line: scenario, noise, given contacts first, method."""
     scenario, noise, contact_source, method = key
     return scenario, noise, rank_contact_source(contact_source), rank_method(method), method
 
 
 def _line(axes: Line, trials: Trials) -> Line:
+    """Return the line of a group of trials.
+
+    Args:
+        axes: Columns that identify the line.
+    """
     planned = trials.where(~np.isnan(trials.number("planned_error_fixed_mm")))
     fixed = planned.number("planned_error_fixed_mm")
     clearance = planned.number("clearance_mm")
     loose = clearance > 0
     inside = trials.number("inside_95")
     passes = trials.number("consistent")
+    # failed tests of trials with a wrong contact that is known
     known = trials.where((passes == 0) & ~trials.holds("wrong_contact", (None,).__contains__))
+    # whether the suspects contain the wrong contact
     named = [
         one in (all_ or ()) for one, all_ in zip(known.values("wrong_contact"), known.values("suspects"), strict=True)
     ]

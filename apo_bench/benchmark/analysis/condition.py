@@ -18,16 +18,19 @@ from apo_bench.records import (
 from apo_bench.records.run.trials import Trials
 
 _FIRST = ("oracle", "uncorrected", "spiral-search", "nominal", "contact", "paper", "paper-track")
-"""Methods in the order of tables: the ceiling, plans without a correction, `contact`, the paper's two methods."""
+"""Methods in the order of tables: oracle, plans without a correction, `contact`, the paper's two methods."""
 
 
+# settings with a field of their own
 _OWN = ("scenario", "clearance_mm", "noise", "contact_source", "human_error_scale", "noise_mm", "noise_deg", "method")
+# further settings that distinguish trials; `fidelity` distinguishes conditions though it is no part of a trial's key
 _OTHERS = tuple(
     name for name, info in SETTINGS.items() if name not in (*_OWN, "seed") and (info.key or name == "fidelity")
 )
 
 
 def _other_fields() -> Iterator[tuple[str, Any, Any]]:
+    """Yield each further setting as a field for `make_dataclass`."""
     for name in _OTHERS:
         yield name, Any, field(default=SETTINGS[name].default, kw_only=True)
 
@@ -40,7 +43,8 @@ _Others: Any = make_dataclass("_Others", _other_fields(), frozen=True)
 class Condition(_Others):  # type: ignore[misc]  # made from the settings, so that a new one is in tables as well
     """All settings of a trial that a sweep may vary, except the seed.
 
-    A curve over noise levels has the noise 0, and a setting, which a table or panel shows, also the method ``.
+    A condition also stands for a curve over noise levels (noise 0), and for a setting that a table or panel shows
+    (noise 0 and an empty method).
     """
 
     scenario: str
@@ -54,21 +58,21 @@ class Condition(_Others):  # type: ignore[misc]  # made from the settings, so th
 
     @property
     def condition(self) -> "Condition":
-        """The condition alone, of something that has one."""
+        """The condition alone, without the results of a subclass."""
         return Condition(**{name: getattr(self, name) for name in CONDITION_FIELDS})
 
     @property
     def curve(self) -> "Condition":
-        """The same at every noise level."""
+        """The condition that stands for all noise levels."""
         return replace(self.condition, noise_mm=0.0, noise_deg=0.0)
 
     @property
     def setting(self) -> "Condition":
-        """The same at every noise level, of every method."""
+        """The condition that stands for all noise levels and methods."""
         return replace(self.curve, method="")
 
     def with_default(self, name: str) -> "Condition":
-        """The same with the default of a setting."""
+        """Return the condition with the default of one setting."""
         changes: dict[str, Any] = {name: SETTINGS[name].default}
         return replace(self.condition, **changes)
 
@@ -89,7 +93,7 @@ class Condition(_Others):  # type: ignore[misc]  # made from the settings, so th
 
     @property
     def description(self) -> str:
-        """All but scenario, method and noise level in words, without most defaults."""
+        """All settings except scenario, method and noise level in words, without most defaults."""
         words = {
             f"human error {self.human_error_scale:g}": True,
             f"{self.clearance_mm:g} mm clearance": True,
@@ -103,7 +107,7 @@ class Condition(_Others):  # type: ignore[misc]  # made from the settings, so th
 
 
 CONDITION_FIELDS = (*_OWN, *_OTHERS)
-"""Columns of a trial record, too."""
+"""Settings that identify a condition, which are also columns of a trial record."""
 
 
 def format_noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> str:
@@ -114,18 +118,18 @@ def format_noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> st
 
 
 def rank_method(method: str) -> int:
-    """The position of a method in a table; one with `+spiral` or `+probe` ranks like the method."""
+    """Return the position of a method in tables; the suffixes `+spiral` and `+probe` do not matter."""
     plain = method if method in _FIRST else parse_method(method).corrector
     return _FIRST.index(plain) if plain in _FIRST else len(_FIRST)
 
 
 def rank_contact_source(contact_source: str) -> tuple[int, str]:
-    """The given contacts first."""
+    """Return a sort key that puts the given contacts first."""
     return int(contact_source != "given"), contact_source
 
 
 def make_sort_key(c: Condition) -> tuple[Any, ...]:
-    """How conditions are sorted: by setting, with defaults first, then by method (`oracle` first), then by noise."""
+    """Return the sort key of a condition: setting, with defaults first; then method; then noise level."""
     others = ((getattr(c, name) != SETTINGS[name].default, getattr(c, name)) for name in _OTHERS)
     noise = (c.noise != USUAL, c.noise, rank_contact_source(c.contact_source))
     return (
@@ -135,26 +139,26 @@ def make_sort_key(c: Condition) -> tuple[Any, ...]:
 
 
 def get_condition(record: Mapping[str, Any]) -> Condition | None:
-    """The condition of a record; None for an observation from a file, which has no noise level."""
+    """Return the condition of a record, or None for an observation from a file, which has no noise level."""
     if record["noise_mm"] is None:
         return None
     return Condition(**{name: record[name] for name in CONDITION_FIELDS if name in record})
 
 
 def group_by_condition(trials: Trials) -> dict[Condition, Trials]:
-    """The trials of every condition, in the order of their seeds, without observations from files.
+    """Group trials by condition, each group sorted by seed, without observations from files.
 
     Raises:
-        InputError: A trial is there twice, which would make intervals narrower than they are; or the trials were drawn
-            with several secret seeds, so that equal seeds are different trials.
+        InputError: A trial occurs twice, which would make intervals too narrow; or the trials were drawn with several
+            secret seeds, so that equal seeds are different trials.
     """
     trials.find_secret_seed()
-    drawn = trials.where(~np.isnan(trials.number("noise_mm")))
+    drawn = trials.where(~np.isnan(trials.number("noise_mm")))  # without observations from files
     parts = drawn.parts(CONDITION_FIELDS).items()
     found = {Condition(**dict(zip(CONDITION_FIELDS, key, strict=True))): own for key, own in parts}
     for condition, own in found.items():
         seeds = own.number("seed")
-        twice = seeds[1:][np.diff(seeds) == 0]
+        twice = seeds[1:][np.diff(seeds) == 0]  # equal neighbours, since seeds are sorted
         if len(twice):
             raise InputError(
                 f"the records hold a trial twice ({condition.scenario}, {condition.method}, noise "
@@ -164,6 +168,6 @@ def group_by_condition(trials: Trials) -> dict[Condition, Trials]:
 
 
 def by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
-    """Scenario and method -> trials, sorted as conditions are."""
+    """Group trials by scenario and method, sorted as conditions are."""
     groups = trials.parts(("scenario", "method"))
     return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank_method(key[1]), key[1]))}

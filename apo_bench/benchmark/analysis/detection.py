@@ -1,4 +1,4 @@
-"""Detected contacts against those of the scenario."""
+"""Compare detected contacts with those of the scenario."""
 
 from typing import Any
 
@@ -13,16 +13,16 @@ _AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scal
 
 
 def tabulate_detection(records: Records) -> list[Line]:
-    """One line per scenario, noise, pose and contact source, human error scale and noise level; and over all scenarios.
+    """Return one line per scenario, noise, pose source, contact source, human error scale and noise level.
 
-    Methods of one seed get the same contacts, so each observation counts once. A demonstration is complete if exactly
-    its contacts were detected.
+    With several scenarios there are also lines over all of them. All methods of one seed get the same contacts, so each
+    observation counts once. A demonstration is complete if exactly its contacts were detected.
     """
     trials = trials_of(records)
     known = ~np.isnan(trials.number("contacts_true_positive")) & ~np.isnan(trials.number("noise_mm"))
     detected = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
     observations = detected.groups((*_AXES, "seed", "clearance_mm")).of
-    once = detected.where(np.unique(observations, return_index=True)[1])
+    once = detected.where(np.unique(observations, return_index=True)[1])  # the first trial of each observation
     parts = once.parts(_AXES)
     if len(once.distinct("scenario")) > 1:
         parts |= {(ALL, *key): own for key, own in once.parts(_AXES[1:]).items()}
@@ -30,6 +30,7 @@ def tabulate_detection(records: Records) -> list[Line]:
 
 
 def _line(axes: Line, trials: Trials) -> Line:
+    """Return the line of a group of observations, identified by `axes`."""
     missed = trials.number("contacts_false_negative")
     false = trials.number("contacts_false_positive")
     right = int(trials.number("contacts_true_positive").sum())
@@ -45,6 +46,6 @@ def _line(axes: Line, trials: Trials) -> Line:
 
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
-    """All scenarios last; contact sources in their own order."""
+    """Return a sort key: all scenarios last, contact sources in the order of `DETECTED`."""
     scenario, noise, pose_source, contact_source, *rest = key
     return (scenario == ALL, scenario, noise, pose_source, DETECTED.index(contact_source), *rest)

@@ -9,7 +9,7 @@ from apo_bench.records.run.trials import trials_of
 
 
 def tabulate_effort(records: Records) -> list[Line]:
-    """One line per scenario and method: means over its successes, at every noise level and human error scale."""
+    """Return one line per scenario and method: means, medians and maxima over its successes in all conditions."""
     trials = trials_of(records)
     right = trials.where(trials.number("success") == 1)
     return [

@@ -1,4 +1,4 @@
-"""Percentiles of the largest contact gap, at observed and at planned poses."""
+"""Percentiles of the largest contact gap at observed and at planned poses."""
 
 import numpy as np
 
@@ -8,12 +8,12 @@ from apo_bench.benchmark.analysis.rates import Records
 from apo_bench.records import uses_contacts
 from apo_bench.records.run.trials import trials_of
 
-_PERCENTILES = {"5": 5.0, "median_mm": 50.0, "95": 95.0}
-_COLUMNS = {"observed": "gap_before_mm", "planned": "gap_after_mm"}
+_PERCENTILES = {"5": 5.0, "median_mm": 50.0, "95": 95.0}  # end of a column's name -> percentile
+_COLUMNS = {"observed": "gap_before_mm", "planned": "gap_after_mm"}  # kind of poses -> column of records
 
 
 def tabulate_gaps(records: Records) -> list[Line]:
-    """One line per condition of a method that corrects, of its trials with a plan, sorted as `tally` sorts; [mm]."""
+    """Return one line, [mm], per condition of a method that uses contacts, over its trials with a plan."""
     trials = trials_of(records)
     known = ~np.isnan(trials.number("gap_before_mm")) & ~np.isnan(trials.number("gap_after_mm"))
     lines = []

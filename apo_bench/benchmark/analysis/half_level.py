@@ -1,11 +1,11 @@
-"""The level at which a method succeeds half the time, and bounds that need no curve but that success falls.
+"""The noise level at which a method succeeds half the time, with bounds that assume only that success falls.
 
-The estimate is where the likeliest falling rates (isotonic regression) cross one half, read along the logarithm of the
-level. Level 0 has no logarithm and is left out of it.
+The estimate is the level, interpolated on a logarithmic scale, at which the isotonic regression of the rates crosses
+one half. Level 0 has no logarithm and is left out.
 
-Its bounds are the level up to which success is surely over one half, and the one from which it is surely under it. They
-are found by exact binomial tests in a fixed order, from each end of the levels to the first one that does not reject:
-each is wrong in at most 2.5 %.
+One bound is the largest level at which success is surely over one half, the other the smallest level at which it is
+surely under one half. Exact binomial tests run in a fixed order, from each end of the levels to the first test that
+does not reject. Each bound is wrong with a probability of at most 2.5 %.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,34 +24,34 @@ from apo_bench.records import DEPTH_CAMERA, knows_truth
 @final
 @dataclass(frozen=True)
 class HalfLevel:
-    """Where success is one half; levels in mm, as in records."""
+    """The noise level at which success is one half; levels are in mm, as in records."""
 
     condition: Condition
-    """At the level 0, which stands for all."""
+    """The curve: the condition at level 0, which stands for all levels."""
     smallest: float
-    """Of the levels tried that are above 0."""
-    largest: float
+    """Smallest level above 0 that was tried."""
+    largest: float  # largest level that was tried
     trials: int
-    """Results over all levels."""
+    """Number of trials over all levels."""
     noise_mm: float | None
-    """The estimate; None where it lies outside the levels tried."""
+    """The estimate; None if it lies outside the levels tried."""
     beyond: str | None
-    """On which side of them it lies, `below` or `above`."""
+    """The side on which it lies outside: `below` or `above`; None if inside."""
     surely_over: float | None
-    """The largest level up to which success is over one half whatever the curve, as long as it falls; None if none."""
+    """Largest level at which success is over one half for any falling curve; None if there is none."""
     surely_under: float | None
-    """The smallest level from which success is under one half whatever the curve; None if none."""
+    """Smallest level from which success is under one half for any falling curve; None if there is none."""
 
     @property
     def text(self) -> str:
-        """`1.31`, `> 4`, `< 0.1`."""
+        """The estimate as text: `1.31`, `> 4`, `< 0.1`."""
         if self.noise_mm is not None:
             return f"{self.noise_mm:.3g}"
         return f"> {self.largest:g}" if self.beyond == "above" else f"< {self.smallest:g}"
 
     @property
     def sure_text(self) -> str:
-        """`1 to 2`, `> 4`, `< 0.1`; `any` where neither bound is known."""
+        """The bounds as text: `1 to 2`, `> 4`, `< 0.1`; `any` if neither bound is known."""
         if self.surely_over is None:
             return "any" if self.surely_under is None else f"< {self.surely_under:g}"
         over = f"{self.surely_over:g}"
@@ -59,23 +59,24 @@ class HalfLevel:
 
 
 def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
-    """One per method and setting that has two levels or more, in the order of the cells; the oracle meets no level.
+    """Estimate one half level per method and setting with at least two levels, in the order of the conditions.
 
-    Where poses are drawn a level is as many degrees as mm; cells with another pair of the two are on no curve.
+    The oracle has none, since noise does not affect it. On a curve a level has equal numbers of mm and degrees (no
+    degrees with the depth camera); other conditions are left out.
     """
     curves = group_by((c.curve, c) for c in cells if c.trials and _is_usual(c) and not knows_truth(c.method))
     return tuple(half_level(condition, own) for condition, own in curves.items() if len(own) > 1)
 
 
 def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLevel:
-    """Where the rates of cells at rising levels cross one half."""
+    """Estimate the level at which success crosses one half from the results at rising levels."""
     from scipy.optimize import isotonic_regression
 
     levels = np.array([c.noise_mm for c in cells])
     right = np.array([c.successes for c in cells])
     trials = np.array([c.trials for c in cells])
     over, under = map(int, sure(right, trials))
-    met = levels > 0
+    met = levels > 0  # levels that have a logarithm
     x = np.log(levels[met])
     falling = isotonic_regression((right / trials)[met], weights=trials[met], increasing=False).x
     beyond = "below" if falling[0] < 0.5 else "above" if falling[-1] > 0.5 else None
@@ -84,29 +85,32 @@ def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLe
         smallest=float(levels[met][0]),
         largest=float(levels[-1]),
         trials=int(trials.sum()),
+        # np.interp needs rising abscissas, so both arrays are reversed
         noise_mm=None if beyond else float(np.exp(np.interp(0.5, falling[::-1], x[::-1]))),
         beyond=beyond,
-        surely_over=float(levels[over - 1]) if over else None,
+        surely_over=float(levels[over - 1]) if over else None,  # `over` levels from the smallest on
         surely_under=float(levels[-under]) if under else None,
     )
 
 
 def sure(right: Array, trials: Array) -> tuple[Array, Array]:
-    """How many levels, counted from the smallest, are surely over one half, and how many, from the largest, under it.
+    """Count the levels, from the smallest on, with success surely over one half, and from the largest on, under it.
 
     Args:
-        right, trials: (..., k) successes and trials at the levels.
+        right, trials: Successes and trials at the levels, (..., k).
 
     Returns:
-        (...) and (...).
+        The two counts, (...) and (...).
     """
     from scipy.stats import binom
 
-    error = (1.0 - CONFIDENCE) / 2.0
+    error = (1.0 - CONFIDENCE) / 2.0  # each bound is one-sided
     over = binom.sf(right - 1, trials, 0.5) <= error
     under = binom.cdf(right, trials, 0.5) <= error
+    # the cumulative product ends a run of rejections at the first test that does not reject
     return np.cumprod(over, axis=-1).sum(axis=-1), np.cumprod(under[..., ::-1], axis=-1).sum(axis=-1)
 
 
 def _is_usual(cell: ConditionResult) -> bool:
+    """Return whether a condition lies on a curve: as many degrees as mm, or none with the depth camera."""
     return cell.noise_deg == (0.0 if cell.noise == DEPTH_CAMERA else cell.noise_mm)

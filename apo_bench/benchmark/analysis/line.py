@@ -1,7 +1,7 @@
-"""A line of a table that is counted over many conditions: column -> value."""
+"""A line of a table that summarises many conditions: column -> value."""
 
 from typing import Any
 
 Line = dict[str, Any]
 ALL = "all"
-"""Stands for every scenario, or every method."""
+"""Value of `scenario` or `method` in a line over all of them."""

@@ -1,14 +1,14 @@
-"""Rates and differences over all trials of a sweep, with intervals over seeds.
+"""Rates and differences over all trials of a sweep, with confidence intervals over seeds.
 
-Trials of one seed share their random numbers, in every scenario and at every noise level. So seeds, and not trials, are
-independent: each gives one number, how many of its trials succeeded, and the intervals are those of the mean over
-seeds. Where every seed has one trial they are Wilson's and Tango's.
+All trials of one seed share their random numbers, in every scenario and at every noise level, so only seeds are
+independent. Each seed gives one number: how many of its trials succeeded. The intervals are those of the mean over
+seeds. If every seed has one trial, they are Wilson's and Tango's intervals.
 
-The interval of a mean assumes no distribution. Each seed gives one number between two bounds. It holds the means whose
-likeliest distribution between the bounds is not much less likely than the sample: A. B. Owen's empirical likelihood
-(Biometrika 75, 1988, 237-249), except that the bounds may carry probability though no seed was there, so that a sample
-in which all seeds are equal still has an interval. Twice the log ratio is compared with Fisher's F with 1 and n - 1
-degrees of freedom (Owen's advice).
+The interval of a mean is that of A. B. Owen's empirical likelihood (Biometrika 75, 1988, 237-249), which assumes no
+distribution. The numbers of seeds lie between two bounds. The interval contains each mean for which the likeliest
+distribution between the bounds is not much less likely than the sample. Unlike Owen's, the distribution may put
+probability on the bounds even if no seed is there, so equal seeds still give an interval. Twice the log likelihood
+ratio is compared with Fisher's F with 1 and n - 1 degrees of freedom (Owen's advice).
 """
 
 from typing import NamedTuple
@@ -21,66 +21,67 @@ from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Index
 
 ERROR = 0.05
-"""Of a two-sided test."""
+"""Significance level of a two-sided test."""
 FEWEST_SEEDS = 6
-"""With fewer, not even a difference at every seed is beyond chance: 2 / 2^n is then over 5 % (sign test)."""
+"""With fewer seeds, even a difference at every seed may be chance: 2 / 2^n is above 5 % (sign test)."""
 _DIGITS = 12
-"""Sums of the same numbers in another order are the same value to so many digits."""
+"""Sums are rounded to this many digits, so that the order of summation does not matter."""
 _EDGE = 1e-9
-"""A mean is not sought closer to a bound than this part of the way."""
+"""The search for a mean stops this share of the interval before a bound, where the likelihood ratio is infinite."""
 
 
 class Results(NamedTuple):
     """The trials of one method that count."""
 
     trial: Index
-    """(n,) a number for all that a trial is of but the method."""
+    """(n,): number of the trial without its method; equal numbers of two methods are paired."""
     seed: Array
-    """(n,)"""
+    """(n,)."""
     success: Array
-    """(n,) 1 or 0."""
+    """(n,): 1 or 0."""
 
 
 class PooledRate(NamedTuple):
-    """How often a method was right."""
+    """The success rate of a method over all its trials."""
 
     right: int
     trials: int
     seeds: int
     interval: Interval
-    """Of the rate; from 0 to 1 with a single seed that has several trials."""
+    """Confidence interval of the rate; 0 to 1 for a single seed with several trials."""
 
 
 class Contrast(NamedTuple):
-    """Two methods over the trials that both have."""
+    """Two methods, compared over the trials that both have."""
 
     ours: int
-    """Trials in which the first was right."""
-    theirs: int
+    """Successes of the first method."""
+    theirs: int  # successes of the second method
     trials: int
     seeds: int
     interval: Interval
-    """Of the difference of the two rates, first minus second."""
+    """Confidence interval of the difference of the two rates, first minus second."""
     better: int
-    """Seeds of which the first was right in more trials."""
-    worse: int
+    """Seeds at which the first method succeeded in more trials."""
+    worse: int  # seeds at which it succeeded in fewer
 
     @property
     def difference(self) -> float:
-        """Rate of the first minus that of the second."""
+        """Success rate of the first method minus that of the second."""
         return (self.ours - self.theirs) / self.trials
 
     @property
     def sure(self) -> bool:
-        """Whether it is beyond chance: 0 is outside the interval, and seeds enough for a sign test differ."""
+        """Whether the difference is significant: 0 is outside the interval, and enough seeds differ for a sign test."""
         by_chance = mcnemar(self.better, self.worse) > ERROR
+        # with one trial per seed, McNemar's test is the sign test
         differ = not by_chance if self.trials == self.seeds else self.better + self.worse >= FEWEST_SEEDS
         return differ and not self.interval.low <= 0.0 <= self.interval.high
 
 
 def pool_rate(results: Results) -> PooledRate:
-    """The rate of one method over all its trials, of which there is one at least."""
-    values, most = _by_seed(results.seed, results.success)
+    """Return the success rate of a method over all its trials, of which there must be at least one."""
+    values, most = _by_seed(results.seed, results.success)  # successes per seed, and the most possible
     right = int(results.success.sum())
     trials = len(results.seed)
     low, high = compute_wilson_interval(right, trials) if len(values) == trials else mean_interval(values, 0.0, most)
@@ -88,18 +89,18 @@ def pool_rate(results: Results) -> PooledRate:
 
 
 def contrast(first: Results, second: Results) -> Contrast | None:
-    """One method against another; None where they have no trial in common."""
+    """Compare two methods; None if they have no trial in common."""
     _, i, j = np.intersect1d(first.trial, second.trial, return_indices=True)
     if not len(i):
         return None
     ours = first.success[i]
     theirs = second.success[j]
-    apart = ours - theirs
+    apart = ours - theirs  # 1, 0 or -1 per trial
     values, most = _by_seed(first.seed[i], apart)
     if len(values) == len(apart):
         interval = compute_tango_interval(int((apart > 0).sum()), int((apart < 0).sum()), len(apart))
     else:
-        # a seed that was not seen may differ in all of its trials
+        # a seed that was not drawn may differ in all of its trials, so the bounds are -most and most
         interval = Interval(*np.clip(mean_interval(values, -most, most), -1.0, 1.0).tolist())
     return Contrast(
         ours=int(ours.sum()),
@@ -113,22 +114,23 @@ def contrast(first: Results, second: Results) -> Contrast | None:
 
 
 def compute_threshold(seeds: int) -> float:
-    """What twice the log likelihood ratio stays below in 95 of 100 samples; infinite with a single seed or none."""
+    """Return the 95 % quantile of twice the log likelihood ratio; infinite with fewer than two seeds."""
     from scipy.special import fdtri
 
     return float(fdtri(1, seeds - 1, CONFIDENCE)) if seeds > 1 else float("inf")
 
 
 def compute_mean_surprise(values: Array, counts: Array, mean: float, low: float = 0.0, high: float = 1.0) -> float:
-    """Twice the log likelihood ratio of a mean, 0 at the mean of the sample.
+    """Return twice the log likelihood ratio of a mean; 0 at the mean of the sample.
 
-    The likeliest weights are n_i / (n (1 + a (x_i - mean))); what they leave over lies on a bound. Twice the log ratio
-    is the largest 2 sum n_i log(1 + a (x_i - mean)) over all a that keep the weights positive at both bounds.
+    The likeliest weights are n_i / (n (1 + a (x_i - mean))); the probability that they leave lies on a bound. Twice the
+    log ratio is the maximum of 2 sum n_i log(1 + a (x_i - mean)) over all a that keep the weights positive at both
+    bounds.
 
     Args:
-        values: (k,) from `low` to `high`.
-        counts: (k,) how many seeds had each value.
-        mean: Strictly between `low` and `high`.
+        values: Distinct values, (k,), from `low` to `high`.
+        counts: Number of seeds with each value, (k,).
+        mean: The mean to test, strictly between `low` and `high`.
     """
     from scipy.optimize import minimize_scalar
 
@@ -144,12 +146,10 @@ def compute_mean_surprise(values: Array, counts: Array, mean: float, low: float 
 
 
 def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interval:
-    """The 95 % confidence interval of a mean by empirical likelihood, which needs no normal distribution.
-
-    It is the whole range without a value.
+    """Return the 95 % confidence interval of a mean by empirical likelihood; the whole range without a value.
 
     Args:
-        values: (n,) from `low` to `high`, one per seed.
+        values: One value per seed, (n,), from `low` to `high`.
     """
     if len(values) == 0:
         return Interval(low, high)
@@ -160,11 +160,12 @@ def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interva
 
 
 def _end(values: Array, counts: Array, low: float, high: float, inside: float, outside: float) -> float:
-    """Where between the mean of the sample and a bound the surprise reaches its threshold."""
+    """Return the end of the interval between the mean of the sample (`inside`) and a bound (`outside`)."""
     from scipy.optimize import brentq
 
     most = compute_threshold(int(counts.sum()))
     edge = _EDGE * (outside - inside)
+    # the bound itself is not excluded
     if edge == 0.0 or compute_mean_surprise(values, counts, outside - edge, low, high) <= most:
         return outside
     ends = inside + edge, outside - edge
@@ -172,10 +173,10 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
 
 
 def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:
-    """The sum over the trials of each seed, (seeds,), and the largest that one could have.
+    """Return the sum of the results of each seed, (seeds,), and the largest sum that a seed could have.
 
-    Both over the mean number of trials of a seed, so that the mean over seeds is that over trials.
+    Both are divided by the mean number of trials of a seed, so that the mean over seeds equals the mean over trials.
     """
     _, of, trials = np.unique(seeds, return_inverse=True, return_counts=True)
-    usual = len(seeds) / len(trials)
+    usual = len(seeds) / len(trials)  # mean number of trials of a seed
     return np.round(np.bincount(of, results) / usual, _DIGITS), float(trials.max() / usual)

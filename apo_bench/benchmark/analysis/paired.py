@@ -1,4 +1,4 @@
-"""Paired comparison of two methods over the same seeds, so that layout, human and noise cancel."""
+"""Compare two methods over the same seeds, so that layout, human error and noise are the same in each pair."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,38 +13,39 @@ from apo_bench.geometry import Array
 from apo_bench.records import TrialConfig, affects, knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
 
+# settings that have their default if they do not affect the reference
 _PAIRED_BY_DEFAULT = ("contact_source", "max_reobservations", "ft_sensor", "assumed_robot_error")
 K = TypeVar("K", bound=Hashable)
-REFERENCES = ("paper", "uncorrected")
+REFERENCES = ("paper", "uncorrected")  # methods that others are compared with
 _EDGE = 1e-9
-"""Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
+"""Roots are sought this far from -1, 1 and the estimate, where the score statistic is undefined."""
 
 
 @final
 @dataclass(frozen=True)
 class PairedComparison:
-    """A method against another one, in one condition."""
+    """A method, compared with a reference method in one condition."""
 
     condition: Condition
-    """Of the method."""
+    """The condition of the method."""
     reference: str
     pairs: int
-    """Seeds of which both have a result."""
+    """Seeds at which both methods have a result."""
     only_method: int
-    """Seeds at which the method alone was right."""
-    only_reference: int
+    """Seeds at which only the method succeeded."""
+    only_reference: int  # seeds at which only the reference succeeded
     both: int
-    """Seeds at which both were right."""
+    """Seeds at which both succeeded."""
     p: float | None
     """McNemar's exact p-value; None without a pair."""
     p_adjusted: float | None
-    """The p-value, adjusted for all comparisons that were made together."""
+    """The p-value after Holm's adjustment for all comparisons made together."""
     planned: int
     """Seeds at which both had a plan."""
     free_mm: float | None
-    """Mean of the differences of the errors in directions that contacts leave free, method minus reference."""
+    """Mean difference, method minus reference, of the error of planned poses in directions that contacts leave free."""
     free_interval: Interval | None
-    """Student's t interval of that mean; None with fewer than two pairs."""
+    """Student's 95 % interval of that mean; None with fewer than two pairs."""
 
     @property
     def difference(self) -> float | None:
@@ -63,23 +64,23 @@ class PairedComparison:
 
     @property
     def recovered(self) -> Rate:
-        """Of the seeds at which the reference failed, those at which the method was right."""
+        """Share of the reference's failures at which the method succeeded."""
         return Rate(self.only_method, self.only_method + self.neither)
 
     @property
     def harmed(self) -> Rate:
-        """Of the seeds at which the reference was right, those at which the method failed."""
+        """Share of the reference's successes at which the method failed."""
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
 def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[PairedComparison, ...]:
-    """Every method but the oracle against every reference, condition by condition, sorted as `tally` sorts.
+    """Compare every method except the oracle with every reference, condition by condition, sorted as `tally` sorts.
 
-    A setting that does not affect the reference has its default there, so one reference serves several conditions.
-    The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
+    A setting that does not affect the reference has its default there, so one reference serves several conditions. The
+    p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` count as one comparison.
 
     Raises:
-        InputError: A trial is there twice.
+        InputError: A trial occurs twice.
     """
     conditions = group_by_condition(trials_of(records)).items()
     counted = {condition: own.where(~np.isnan(own.number("success"))) for condition, own in conditions}
@@ -96,38 +97,41 @@ def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Pa
 
 
 def holm(p: Mapping[K, float]) -> dict[K, float]:
-    """The p-values of a family of tests, raised so that the chance of one false alarm or more is bounded.
+    """Adjust p-values for multiple tests by Holm's method, which bounds the chance of one false alarm or more.
 
     After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
     65-70.
     """
     tests = sorted(p, key=lambda test: p[test])
-    # of m tests the i-th smallest (from 0) is held to its share of the m - i that are left, and is never below the last
+    # of m tests the i-th smallest p-value (from 0) is multiplied by m - i, and may not fall below the one before
     raised = np.maximum.accumulate([(len(p) - i) * p[test] for i, test in enumerate(tests)])
     adjusted = dict(zip(tests, np.minimum(raised, 1.0).tolist(), strict=True))
     return {test: adjusted[test] for test in p}
 
 
 def reference_condition(condition: Condition, reference: str) -> Condition:
-    """The condition that a condition, or a curve, is compared with: settings that do not affect the reference are
-    defaults there."""
+    """Return the condition of the reference that a condition, or a curve, is compared with.
+
+    Settings that do not affect the reference have their defaults there.
+    """
     usual = {name: getattr(TrialConfig, name) for name in _PAIRED_BY_DEFAULT if not affects(name, reference)}
     return replace(condition, method=reference, **usual)
 
 
 def _comparison(pair: PairedComparison) -> frozenset[Condition]:
+    # unordered, so that both directions of a comparison have one key
     return frozenset((pair.condition, reference_condition(pair.condition, pair.reference)))
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """The two-sided exact p-value: how unlikely so uneven a split is if each discordant pair falls either way alike.
+    """Return the two-sided exact p-value of a split of discordant pairs if both directions are equally likely.
 
     After Q. McNemar, Note on the sampling error of the difference between correlated proportions or percentages,
     Psychometrika 12 (1947), 153-157; exact by the binomial distribution. Without a discordant pair it is 1.
 
     Args:
-        only_first: Pairs in which the first alone succeeded.
-        only_second: Pairs in which the second alone succeeded.
+        only_first: Pairs in which only the first succeeded.
+        only_second: Pairs in which only the second succeeded.
     """
     from scipy.stats import binomtest
 
@@ -137,16 +141,16 @@ def mcnemar(only_first: int, only_second: int) -> float:
 
 @lru_cache(maxsize=65536)
 def compute_tango_interval(b: int, c: int, n: int) -> Interval:
-    """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
+    """Return Tango's 95 % score interval of a difference of paired proportions, (b - c) / n.
 
-    The differences at which Tango's score statistic is within the normal quantile; sensible where no pair is
-    discordant, when it is 0 -+ z^2 / (n + z^2). After T. Tango, Equivalence test and confidence interval for the
-    difference in proportions for the paired-sample design, Statistics in Medicine 17 (1998), 891-908.
+    It contains the differences at which Tango's score statistic is within the normal quantile z. Without a discordant
+    pair it is 0 -+ z^2 / (n + z^2). After T. Tango, Equivalence test and confidence interval for the difference in
+    proportions for the paired-sample design, Statistics in Medicine 17 (1998), 891-908.
 
     Args:
-        b: Pairs in which the first alone succeeded.
-        c: Pairs in which the second alone succeeded.
-        n: All pairs; without one nothing is known: -1 to 1.
+        b: Pairs in which only the first succeeded.
+        c: Pairs in which only the second succeeded.
+        n: All pairs; without any the interval is -1 to 1.
     """
     from scipy.optimize import brentq
     from scipy.special import ndtri
@@ -156,13 +160,17 @@ def compute_tango_interval(b: int, c: int, n: int) -> Interval:
     z = float(ndtri((1 + CONFIDENCE) / 2))
     d = (b - c) / n
     # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
+    # with c == n there is no root: the interval begins at -1
     low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + _EDGE, d - _EDGE)
     high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))
 
 
 def _score(b: int, c: int, n: int, delta: float) -> float:
-    """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+    """Return Tango's score statistic for a difference delta.
+
+    q is the likeliest probability of a pair of kind c, given that difference.
+    """
     # q is the larger root of 2 n q^2 + B q - c delta (1 - delta) = 0, where the likelihood is flat along delta
     B = -b - c + (2 * n - b + c) * delta
     q = (np.sqrt(max(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
@@ -170,6 +178,7 @@ def _score(b: int, c: int, n: int, delta: float) -> float:
 
 
 def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> PairedComparison:
+    """Compare the trials of two methods at the seeds that both have."""
     _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
     ours = ours.where(i)
     theirs = theirs.where(j)
@@ -195,10 +204,11 @@ def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) 
 
 
 def _student(x: Array) -> Interval | None:
-    """Student's t interval of a mean at 95 %: mean -+ t(n - 1) s / sqrt(n), s with n - 1 degrees of freedom."""
+    """Return Student's 95 % interval of a mean, mean -+ t(n - 1) s / sqrt(n); None with fewer than two values."""
     from scipy.stats import sem, t
 
     if len(x) < 2:
         return None
+    # equal values have no spread
     ends = t.interval(CONFIDENCE, len(x) - 1, loc=np.mean(x), scale=sem(x)) if np.ptp(x) else (x[0], x[0])
     return Interval(*map(float, ends))

@@ -1,4 +1,4 @@
-"""Which plans were predicted to fail, against what physics then made of them."""
+"""Compare failure predictions of plans with the outcome in physics."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from apo_bench.records.run.trials import Trials, trials_of
 
 
 def tabulate_confusion(records: Records) -> list[Line]:
-    """One line per scenario and method, sorted as `tally` sorts, and one of them all at the end.
+    """Return one line per scenario and method, sorted as `tally` sorts, and a last line over all.
 
-    Fitted means a success made as demonstrated, which is what a plan predicts. Of the trials that were rightly
-    predicted to fail, `stopped` counts those in which the robot stopped at an operation, and `same_operation` those in
-    which it was the predicted one. A trial without an executed plan is not executed.
+    A plan predicts a success as demonstrated, which is called fitted here. Of the trials that were rightly predicted to
+    fail, `stopped` counts those in which the robot stopped at an operation, and `same_operation` those in which it
+    stopped at the predicted one. Trials without an executed plan count as not executed.
     """
     trials = trials_of(records)
     return [*(_line(*key, own) for key, own in by_method(trials).items()), _line(ALL, ALL, trials)]
@@ -24,9 +24,9 @@ def _line(scenario: str, method: str, trials: Trials) -> Line:
     executed = counted.where(~np.isnan(counted.number("predicted_fails")) & was_executed(counted))
     fails = executed.number("predicted_fails") == 1
     fitted = executed.number("as_demonstrated") == 1
-    caught = executed.where(fails & ~fitted)
+    caught = executed.where(fails & ~fitted)  # rightly predicted to fail
     stopped = caught.where(~np.isnan(caught.number("failure_operation")))
-    right = int((fails != fitted).sum())
+    right = int((fails != fitted).sum())  # the prediction agrees with the outcome
     return {
         "scenario": scenario,
         "method": method,

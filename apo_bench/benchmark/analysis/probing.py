@@ -1,4 +1,4 @@
-"""Estimates of robots that probe, against the standard deviations that their errors were drawn with."""
+"""Compare the estimates of robots that probe with the standard deviations that their errors were drawn with."""
 
 import math
 
@@ -12,10 +12,10 @@ from apo_bench.records.run.trials import Trials, trials_of
 
 
 def tabulate_probing(records: Records) -> list[Line]:
-    """One line per condition of a robot that probed, sorted as `tally` sorts.
+    """Return one line per condition of a robot that probed, sorted as `tally` sorts.
 
-    Lengths [mm] and angles [deg] are root mean squares of vectors: the error of the base as drawn, as assumed (None if
-    unknown), as estimated, and the stated standard deviation of the estimate.
+    Lengths [mm] and angles [deg] are root mean squares of vectors: the base error as drawn, as assumed (None if
+    unknown) and as estimated, and the stated standard deviation of the estimate.
     """
     trials = trials_of(records)
     own = trials.where(~np.isnan(trials.number("probe_contacts")))
@@ -43,6 +43,9 @@ def _line(condition: Condition, trials: Trials) -> Line:
 
 
 def _as_vector(name: str) -> tuple[float, float]:
-    """Root mean squares of vectors of three axes, of the error of the base."""
+    """Return the root mean square length [mm] and angle [deg] of the base error of a robot error.
+
+    A vector of three axes has sqrt(3) times the standard deviation per axis.
+    """
     mm, deg = parse_robot_error(name).hand_eye
     return math.sqrt(3.0) * mm, math.sqrt(3.0) * deg

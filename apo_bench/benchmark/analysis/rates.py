@@ -16,10 +16,12 @@ from apo_bench.records.run.trials import Mask, Trials, trials_of
 
 CONFIDENCE = 0.95
 Records = Trials | Iterable[Mapping[str, Any]]
-"""Trials as columns, or as records."""
+"""Trials as columns, or as an iterable of records."""
 NOT_EXECUTED = ("observe", "correct", "predicted-success", "plan", "worker")
-"""Stages of failures without an executed plan: there is none, its predicted success is too low, the planner rejects it,
-or its process died."""
+"""Failure stages without an executed plan.
+
+There was no plan, its predicted success was too low, the planner rejected it, or the worker process died.
+"""
 
 
 class Interval(NamedTuple):
@@ -30,19 +32,19 @@ class Interval(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """So many successes among so many trials."""
+    """A number of successes among a number of trials."""
 
     successes: int
     trials: int
 
     @property
     def rate(self) -> float | None:
-        """None without a trial."""
+        """Share of successes; None without a trial."""
         return self.successes / self.trials if self.trials else None
 
     @property
     def interval(self) -> Interval:
-        """Wilson's at 95 %."""
+        """Wilson's 95 % interval of the rate."""
         return compute_wilson_interval(self.successes, self.trials)
 
 
@@ -52,25 +54,24 @@ class ConditionResult(Condition):
     """The results of the trials of a condition."""
 
     trials: int
-    """Trials that count: those whose demonstration was right."""
+    """Trials that count: those whose demonstration was correct."""
     successes: int
-    """The finished assembly is right."""
+    """Trials whose finished assembly is correct."""
     demonstrated: int
-    """Successes of which every contact was also made when and where it was demonstrated."""
-    loose_successes: int
+    """Successes in which every contact was also made when and where it was demonstrated."""
+    loose_successes: int  # successes by the loose criteria
     not_executed: int
-    """Failures without an executed plan: nothing was corrected, the predicted success was too low, the planner rejected
-    the plan, or the worker died. They count as failures."""
+    """Failures without an executed plan: no correction, low predicted success, a rejected plan, or a dead worker."""
     abstained: int
     """Those of them with too low a predicted success."""
     predicted_success: float | None
-    """Mean over the plans; None without one."""
+    """Mean predicted success of the plans; None without a plan."""
     brier: float | None
     """Mean squared difference of predicted success and success over the executed plans."""
     excluded: int
-    """Trials that no method counts, since the demonstration itself was not right."""
+    """Trials that count for no method, since the demonstration itself failed."""
     failures: Mapping[str, int]
-    """`stage: code` -> how many, most frequent first."""
+    """`stage: code` -> number of failures, most frequent first."""
 
     @property
     def rate(self) -> float | None:
@@ -84,7 +85,7 @@ class ConditionResult(Condition):
 
     @property
     def tightness(self) -> float | None:
-        """Clearance per side over noise level, mm per mm: small is tight; None where poses are observed exactly."""
+        """Clearance per side over noise level, both in mm: small is tight; None if poses are observed exactly."""
         return self.clearance_mm / self.noise_mm if self.noise_mm > 0 else None
 
     @property
@@ -97,7 +98,7 @@ class ConditionResult(Condition):
 
     @property
     def executed(self) -> Rate:
-        """Success among the trials whose plan was executed."""
+        """Successes among the trials whose plan was executed."""
         return Rate(self.successes, self.trials - self.not_executed)
 
     @property
@@ -109,7 +110,7 @@ class ConditionResult(Condition):
 
 @lru_cache(maxsize=65536)
 def compute_wilson_interval(successes: int, trials: int) -> Interval:
-    """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
+    """Return Wilson's 95 % score interval; 0 to 1 without trials."""
     from scipy.stats import binomtest
 
     if trials == 0:
@@ -119,32 +120,32 @@ def compute_wilson_interval(successes: int, trials: int) -> Interval:
 
 
 def tally(records: Records) -> tuple[ConditionResult, ...]:
-    """Count trials by condition, sorted by scenario, clearance, noise, contacts, human error, grasp, method, level.
+    """Count trials by condition, sorted as `make_sort_key` states.
 
     Raises:
-        InputError: A trial is there twice.
+        InputError: A trial occurs twice.
     """
     return tuple(_count(condition, own) for condition, own in group_by_condition(trials_of(records)).items())
 
 
 def mean(numbers: Array) -> float | None:
-    """Of the numbers that are known; None without one."""
+    """Return the mean of the numbers that are not NaN; None without any."""
     known = numbers[~np.isnan(numbers)]
     return float(known.mean()) if len(known) else None
 
 
 def root_mean_square(x: Array) -> float | None:
-    """None without a number."""
+    """Return the root mean square; None without a number."""
     return math.sqrt(float(np.mean(x**2))) if len(x) else None
 
 
 def was_executed(trials: Trials) -> Mask:
-    """(n,) whether a plan was carried out to its end, or to where something failed."""
+    """Return a mask, (n,), of trials whose plan was executed to its end or to a failure."""
     return ~trials.holds("failure_stage", NOT_EXECUTED.__contains__)
 
 
 def _count(condition: Condition, trials: Trials) -> ConditionResult:
-    counted = trials.where(~np.isnan(trials.number("success")))
+    counted = trials.where(~np.isnan(trials.number("success")))  # success is unknown if the demonstration failed
     failed = counted.where(counted.number("success") == 0)
     why = Counter(map("{}: {}".format, failed.values("failure_stage"), failed.values("failure_code")))
     return ConditionResult(
@@ -163,5 +164,5 @@ def _count(condition: Condition, trials: Trials) -> ConditionResult:
 
 
 def brier_score(counted: Trials) -> float | None:
-    """Mean squared difference of predicted success and success over the trials whose plan was executed."""
+    """Return the Brier score: the mean squared difference of predicted success and success over executed plans."""
     return mean((counted.number("predicted_success") - counted.number("success"))[was_executed(counted)] ** 2)

@@ -1,4 +1,4 @@
-"""Rates, paired differences and half levels of a report in one call."""
+"""Compute rates, paired differences and half levels of a report in one call."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from apo_bench.records.run.trials import trials_of
 
 
 class Summary(NamedTuple):
-    """Each sorted as `tally` sorts, whatever the order of records."""
+    """Rates, pairs and half levels, each sorted as `tally` sorts."""
 
     results: tuple[ConditionResult, ...]
     pairs: tuple[PairedComparison, ...]
@@ -18,13 +18,13 @@ class Summary(NamedTuple):
 
 
 def summarise(records: Records, references: Sequence[str] = REFERENCES) -> Summary:
-    """Rates, pairs and half levels of trials.
+    """Compute the numbers of a report.
 
     Args:
-        references: The methods that every other one is compared with.
+        references: The methods that every other method is compared with.
 
     Raises:
-        InputError: A trial is there twice.
+        InputError: A trial occurs twice.
     """
     trials = trials_of(records)
     results = tally(trials)

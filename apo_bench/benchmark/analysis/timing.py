@@ -12,14 +12,14 @@ from apo_bench.benchmark.analysis.line import Line
 from apo_bench.io import group_by, read_lines
 from apo_bench.records.run.validation import timing_of
 
-_PARTS = ("compile_s", "demonstrate_s", "trial_s")
+_PARTS = ("compile_s", "demonstrate_s", "trial_s")  # parts of a worker's time
 
 
 def read_timing(folder: Path) -> list[dict[str, Any]]:
-    """The lines of trials that were timed; none if there is no such file.
+    """Read the lines of `timing.jsonl` whose trial was timed; none if there is no such file.
 
     Raises:
-        InputError: The file cannot be read, or a line is none; one sentence with file, line and field.
+        InputError: The file cannot be read, or a line is invalid; the sentence names file, line and field.
     """
     path = folder / "timing.jsonl"
     if not os.path.lexists(path):
@@ -29,7 +29,10 @@ def read_timing(folder: Path) -> list[dict[str, Any]]:
 
 
 def tabulate_trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
-    """One line per scenario and method: percentiles and sum [s] of trials without demonstration and compilation."""
+    """Return one line per scenario and method: percentiles and sum [s] of trial times.
+
+    The times exclude demonstration and compilation.
+    """
     times = group_by(((line["scenario"], line["method"]), line["trial_s"]) for line in lines)
     made = []
     for scenario, method in sorted(times, key=lambda key: (key[0], rank_method(key[1]), key[1])):
@@ -50,7 +53,7 @@ def tabulate_trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
 
 
 def tabulate_work(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
-    """One line per host and worker, with the rate over its busy time."""
+    """Return one line per host and worker, with its rate of trials over its busy time."""
     workers = group_by(
         ((str(line.get("host")), str(line.get("worker"))), sum(line.get(part) or 0.0 for part in _PARTS))
         for line in lines

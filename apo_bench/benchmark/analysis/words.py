@@ -1,10 +1,10 @@
-"""How rates, differences and intervals are written for people."""
+"""Format rates, differences and intervals for people."""
 
 from apo_bench.benchmark.analysis.rates import Interval
 
 
 def format_percent(rate: float | None, digits: int = 1) -> str:
-    """`97.0 %`, or a dash where nothing counted; only what is all or nothing says 100.0 or 0.0."""
+    """Format a rate: `97.0 %`, or a dash for None; `100.0 %` and `0.0 %` only if the rate is exactly 1 or 0."""
     if rate is None:
         return "–"
     text = f"{100 * rate:.{digits}f}"
@@ -15,16 +15,16 @@ def format_percent(rate: float | None, digits: int = 1) -> str:
 
 
 def format_percent_interval(interval: Interval, digits: int = 1) -> str:
-    """`91.5 to 99.0 %`."""
+    """Format an interval: `91.5 to 99.0 %`."""
     return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
 
 
 def format_signed(x: float, digits: int) -> str:
-    """`+4.0`; what is nothing to so many digits has no minus."""
+    """Format a number with its sign: `+4.0`; a number that rounds to 0 has no minus."""
     return f"{round(x, digits) + 0.0:+.{digits}f}"
 
 
 def format_points(share: float | Interval) -> str:
-    """`+4.0`, or `-0.3 to +9.1`: hundredths of a difference of two rates."""
+    """Format a difference of rates, or its interval, in percentage points: `+4.0`, or `-0.3 to +9.1`."""
     ends = share if isinstance(share, tuple) else (share,)
     return " to ".join(format_signed(100 * x, 1) for x in ends)

@@ -1,4 +1,4 @@
-"""Data to learn from: pairs of observation and truth."""
+"""Data for learning: pairs of observation and truth."""
 
 from apo_bench.benchmark.datasets.drawing import Pairs, draw_endless_pairs, draw_pairs
 

@@ -1,4 +1,4 @@
-"""The card of a data set: `README.md` with fields, episodes and metadata."""
+"""The card of a data set: a `README.md` with fields, episodes and metadata."""
 
 import math
 from collections.abc import Mapping
@@ -11,19 +11,19 @@ from apo_bench.geometry import Array
 from apo_bench.io import format_count, write_file
 
 FPS = 20
-"""Frames, and actions, a second of simulated time."""
+"""Frames, and actions, per second of simulated time."""
 
 
 class Field(NamedTuple):
-    """A row of numbers of every frame."""
+    """A vector of numbers that every frame has."""
 
     names: tuple[str, ...]
     unit: str
     frame: str
-    """In which coordinates."""
+    """The coordinate frame of its numbers."""
     meaning: str
     most: float | tuple[float, ...] = math.inf
-    """No number is larger, nor its negative."""
+    """Bound of the absolute value of each number."""
 
 
 @final
@@ -32,37 +32,37 @@ class RecordedEpisode:
     """One episode of T actions."""
 
     seed: int
-    """The number of its trial."""
+    """Seed of its trial."""
     task: str
-    """In words."""
+    """The task in words."""
     observations: Mapping[str, Array]
-    """Field -> (T + 1, k), before the first action and after each."""
+    """Field -> (T + 1, k): values before the first action and after each."""
     actions: Array
     """(T, k)."""
     rewards: Array
     """(T,)."""
     more: Mapping[str, Any]
-    """Column of the table of episodes -> what it says of this one; `success` is among them."""
+    """Column of the table of episodes -> its value for this episode; `success` is among them."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class DatasetMetadata:
-    """What is known of all episodes."""
+    """Everything that the episodes of a data set have in common."""
 
     name: str
     """`replays` or `insertions`."""
     summary: str
     command: str
-    """What made them."""
+    """The command line that made them."""
     fields: Mapping[str, Field]
-    """Of the observations."""
+    """Fields of the observations."""
     action: Field
     episodes: Mapping[str, str]
-    """Column of the table of episodes -> what it is."""
+    """Column of the table of episodes -> its meaning."""
     robot: str
     env_spec: str | None = None
-    """Of the environment, as Gymnasium writes it."""
+    """The environment as JSON, as Gymnasium writes it."""
 
 
 LICENCE = "Apache-2.0"
@@ -71,11 +71,11 @@ LICENCE = "Apache-2.0"
 def write_card(
     about: DatasetMetadata, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]
 ) -> None:
-    """Write the dataset card `README.md`: every field with its unit and frame, the licence, the command.
+    """Write the card `README.md`: every field with its unit and frame, the licence, the command.
 
     Args:
-        counted: How many episodes there are, and how many of them are right.
-        tables: Files, as a pattern -> column -> a `Field`, or in words what it is.
+        counted: Number of episodes, and number of successes.
+        tables: Pattern of files -> column -> its `Field`, or its meaning in words.
     """
     trials = f"{format_count(counted[0], 'simulated trial')}, {counted[1]} right"
     summary = f"{trials}, made by apo_bench {__version__} with MuJoCo"
@@ -98,6 +98,7 @@ def write_card(
 
 
 def _cells(column: Field | str) -> tuple[str, ...]:
+    """Return size, unit, frame and meaning of a column; of a column described in words only the meaning."""
     if isinstance(column, str):
         return ("", "", "", column)
     return (str(len(column.names) or ""), column.unit, column.frame, column.meaning)

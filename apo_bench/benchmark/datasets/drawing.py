@@ -1,6 +1,6 @@
-"""Pairs of observation and truth, drawn without physics from streams of chance that no trial uses.
+"""Draw pairs of observation and truth without physics, from random streams that no trial uses.
 
-Many demonstrations, seen by one call of a noise model: as one long demonstration whose parts are all different.
+Noise models that allow it observe many demonstrations in one call, as one long demonstration of different parts.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -54,39 +54,39 @@ _BY_PART = frozenset(
         *(EmpiricalNoise, FittedNoise),
     )
 )
-"""Models whose errors of operations on different parts are independent, whatever else is seen."""
+"""Noise models whose errors of operations on different parts are independent of each other."""
 
 
 @final
 class Seen(NamedTuple):
-    """What was seen of many demonstrations."""
+    """The observations of n demonstrations with k operations each."""
 
     poses: Array
-    """(n, k, 4, 4)."""
+    """(n, k, 4, 4), observed poses."""
     covariance: Array
-    """(n, k, 6, 6)."""
+    """(n, k, 6, 6), stated covariances."""
     seen: NDArray[np.bool_]
-    """(n, k)."""
+    """(n, k), whether the operation was observed."""
 
 
 def by_part(noise: Noise) -> bool:
-    """Whether a noise model draws many demonstrations at once; others draw one after the other."""
+    """Return whether a noise model can observe many demonstrations in one call."""
     return type(noise) in _BY_PART or (isinstance(noise, CameraFailures) and noise.by_part)
 
 
 def observe_many(
     assembly: Assembly, shown: Layouts, human_error: Array, noise: Noise, rng: np.random.Generator
 ) -> Seen:
-    """What a noise model makes of many demonstrations of one assembly.
+    """Observe many demonstrations of one assembly by a noise model.
 
     Args:
-        shown: Where every part was put.
-        human_error: (k, 6, 6), covariance as in a `Demonstration`.
+        shown: Poses at which the human placed the parts, in n layouts.
+        human_error: Covariance as in a `Demonstration`, (k, 6, 6).
     """
     n, k = shown.poses.shape[:2]
     if by_part(noise):
         start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
-        long = Demonstration(
+        long = Demonstration(  # all demonstrations in a row; each has its own copies of the parts
             _repeated(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error, (n, 1, 1))
         )
         return _stacked([noise(long.assembly, long, rng)], n, k)
@@ -98,6 +98,7 @@ def observe_many(
 
 
 def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
+    """Join observations into arrays of n demonstrations with k operations."""
     return Seen(
         np.concatenate([seen.poses for seen in observations]).reshape(n, k, 4, 4),
         np.concatenate([seen.covariance for seen in observations]).reshape(n, k, 6, 6),
@@ -106,12 +107,13 @@ def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
 
 
 def _copy(part: str, i: int) -> str:
+    # name of the copy of a part in demonstration i
     return f"{part}/{i}"
 
 
 @lru_cache(maxsize=32)
 def _repeated(assembly: Assembly, n: int) -> Assembly:
-    """The same operations n times, each time with parts of their own, and without contacts, which no camera sees."""
+    """Return n copies of the operations, each with parts of its own, and without contacts, which no camera observes."""
     return Assembly(
         {_copy(part, i): solid for part, solid in assembly.solids.items() for i in range(n)},
         tuple(
@@ -124,39 +126,39 @@ def _repeated(assembly: Assembly, n: int) -> Assembly:
 
 
 BLOCK = 128
-"""So many pairs of a scenario are drawn at once, whatever is asked for: more of them begin with the same ones."""
-_MOST = 10_000_000
+"""Number of pairs of a scenario drawn together, so that a larger data set begins with the same pairs."""
+_MOST = 10_000_000  # pairs in one call of draw_pairs
 STREAM = 0x70616972
-"""What tells these streams of chance from others of the same seed; trials have none with a spawn key."""
+"""Key that separates these random streams from others of the same seed; those of trials have no spawn key."""
 
-Given = str | Path | Scenario
+Given = str | Path | Scenario  # a scenario by name, by file or as an object
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """n pairs of at most k operations: what was seen, and where everything really goes.
+    """n pairs of at most k operations: the observation, and the true target poses.
 
-    A data set with a length and an index, as `torch.utils.data.DataLoader` takes it: `pairs[i]` has the entries of pair
-    i, `pairs[i:j]` those of several, as arrays of their own. Beyond the last operation of a pair there are identities,
-    and `seen` is False.
+    A data set with length and index, as `torch.utils.data.DataLoader` takes it: `pairs[i]` has the entries of pair i,
+    `pairs[i:j]` those of several, as new arrays. Beyond the last operation of a pair there are identities, and `seen`
+    is False.
     """
 
     poses: Array
-    """(n, k, 4, 4): seen, world frame, [m]."""
+    """(n, k, 4, 4): observed poses, world, [m]."""
     covariance: Array
-    """(n, k, 6, 6): stated, of the body twist by which each goal is wrong, [m, rad]."""
+    """(n, k, 6, 6): stated covariance of the error of each pose as a body twist, [m, rad]."""
     seen: NDArray[np.bool_]
-    """(n, k): whether the operation was seen at all."""
+    """(n, k): whether the operation was observed."""
     truth: Array
-    """(n, k, 4, 4): goals at which every contact holds, world frame, [m]."""
+    """(n, k, 4, 4): poses at which every contact holds, world, [m]."""
     operations: NDArray[np.int64]
-    """(n,): how many operations a pair has."""
+    """(n,): number of operations of each pair."""
     scenario: NDArray[np.int64]
-    """(n,): which of `scenarios` it is of."""
+    """(n,): index of its scenario in `scenarios`."""
     scenarios: tuple[str, ...]
     together: bool
-    """Whether the noise was drawn for many pairs at once; if not, for one after the other, which takes longer."""
+    """Whether the noise was drawn for many pairs at once; if not, pair by pair, which takes longer."""
 
     def __len__(self) -> int:
         return len(self.truth)
@@ -165,7 +167,7 @@ class Pairs:
         return {name: np.array(getattr(self, name)[which]) for name in _ARRAYS}
 
 
-_ARRAYS = tuple(field.name for field in fields(Pairs))[:6]
+_ARRAYS = tuple(field.name for field in fields(Pairs))[:6]  # the fields that are arrays
 
 
 @check_arguments
@@ -178,15 +180,15 @@ def draw_pairs(
     noise_level: float | Sequence[float] = 1.0,
     human_error_scale: float = TrialConfig.human_error_scale,
 ) -> Pairs:
-    """Pairs of observation and truth; of several scenarios in turn.
+    """Draw pairs of observation and truth, of several scenarios in turn.
 
-    No physics: a part is shown exactly where the hand puts it, with the human error. The pairs are those that
-    `draw_endless_pairs` begins with, so more of them begin with the same ones.
+    There is no physics: each part is placed exactly where the hand puts it, with the human error. The pairs are the
+    first ones of `draw_endless_pairs`, so a larger n begins with the same pairs.
 
     Args:
         scenarios: Names, files or objects, one or several.
-        noise: As in `make_noise`.
-        n: How many.
+        noise: Noise model, as in `make_noise`.
+        n: Number of pairs.
         seed: From 0. No layout and no error of it is one of a trial of a sweep or a track.
         noise_level: Standard deviation in mm and degrees, one number for both or a pair.
         human_error_scale: 0 for a human without error, 1 for the error that the scenario states.
@@ -215,7 +217,7 @@ def draw_endless_pairs(
     noise_level: float | Sequence[float] = 1.0,
     human_error_scale: float = TrialConfig.human_error_scale,
 ) -> Iterator[Pairs]:
-    """Pairs without end, `BLOCK` of each scenario at a time, in turn; arguments are those of `draw_pairs`."""
+    """Draw pairs without end, `BLOCK` of each scenario at a time; arguments are those of `draw_pairs`."""
     several: Any = scenarios if isinstance(scenarios, Iterable) and not isinstance(scenarios, str) else [scenarios]
     given = [*several]
     require(given, "no scenario was given; give one or more.")
@@ -227,6 +229,7 @@ def draw_endless_pairs(
 
 
 def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, human_error_scale: float) -> Pairs:
+    """Draw block `number`: `BLOCK` pairs of each of m scenarios, interleaved, so that pair i has scenario i mod m."""
     m = len(scenarios)
     n = m * BLOCK
     k = max(len(scenario.assembly) for scenario in scenarios)
@@ -240,26 +243,28 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
         seen = observe_many(
             scenario.assembly, shown, compute_human_error_covariance(scenario, human_error_scale), noise, rng
         )
+        # every m-th pair, up to the last operation of the scenario
         rows = slice(i, None, m), slice(len(scenario.assembly))
         truth[rows] = layouts.poses
         goals[rows], covariance[rows], there[rows] = seen
     sizes = np.array([len(scenario.assembly) for scenario in scenarios])
-    turn = np.tile(np.arange(m), BLOCK)
+    turn = np.tile(np.arange(m), BLOCK)  # scenario of each pair
     names = tuple(scenario.name for scenario in scenarios)
     return Pairs(goals, covariance, there, truth, sizes[turn], turn, names, by_part(noise))
 
 
 def seed_block(seed: int, scenario: str, number: int) -> np.random.Generator:
-    """The random numbers of one block of a scenario of this name."""
+    """Return the random generator of one block of a scenario with this name."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 
 
 def _mistakes(scenario: Scenario, human_error_scale: float, rng: np.random.Generator) -> Array:
-    """The human error of every pose, (BLOCK, k, 4, 4): as in a demonstration, in each of the layouts."""
+    """Draw the human error of every pose in each of `BLOCK` layouts, (BLOCK, k, 4, 4), as in a demonstration."""
     twists = np.zeros((BLOCK, len(scenario.assembly), 6))
     if (how := scenario.human_error) is not None:
-        # how an error spreads is the same in every layout, and in proportion to it
+        # the error is proportional to its size, and its direction is the same in every layout
         way = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), how.axis).offsets
+        # either direction, with a size that is uniform between the limits of the scenario
         size = human_error_scale * rng.choice([-1.0, 1.0], BLOCK) * rng.uniform(how.low_m, how.high_m, BLOCK)
         twists[..., :3] = size[:, None, None] * way
     return pose.exp(twists)

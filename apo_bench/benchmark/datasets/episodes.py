@@ -1,4 +1,4 @@
-"""Trials as episodes of a data set: observations, plans, true poses and frames."""
+"""Record trials as episodes of a data set: observations, plans, true poses, and frames of the replay."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from apo_bench.simulation.scene import WRIST_SENSORS, Scene, get_part_pose, swit
 from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 
-_OF_ROW = MappingProxyType(
+_OF_ROW = MappingProxyType(  # columns of a trial record that the table of episodes has -> meaning
     {
         "scenario": "the assembly",
         "seed": "number of the trial",
@@ -36,7 +36,7 @@ _OF_ROW = MappingProxyType(
         "config_hash": "of everything that this trial depends on",
     }
 )
-_POSES = "(x, y, z, qw, qx, qy, qz), world frame, m"
+_POSES = "(x, y, z, qw, qx, qy, qz), world frame, m"  # layout of a pose, for the meanings below
 OF_EPISODE: Mapping[str, str] = MappingProxyType(
     {
         **_OF_ROW,
@@ -50,7 +50,7 @@ OF_EPISODE: Mapping[str, str] = MappingProxyType(
         "schedule": "what the plan does: k for operation k, -k where it undoes it, from 1",
     }
 )
-"""What is said of an episode -> what it is."""
+"""Column of an episode -> its meaning."""
 KINDS = MappingProxyType(
     {
         **dict.fromkeys(("failure_stage", "failure_code"), "text"),
@@ -59,7 +59,7 @@ KINDS = MappingProxyType(
         "schedule": "wholes",
     }
 )
-"""Of what is not said of every episode, so that tables of any trials can be joined."""
+"""Column -> its type, for columns that may be null in all episodes; data sets with the same types can be joined."""
 EPISODES: Mapping[str, str] = MappingProxyType(
     {
         "episode": "from 0; its frames are in frames/EPISODE.parquet, if it was replayed",
@@ -67,8 +67,8 @@ EPISODES: Mapping[str, str] = MappingProxyType(
         "frames": "how many frames there are",
     }
 )
-"""Column of episodes.parquet -> what it is."""
-_WRENCH = Field(
+"""Column of episodes.parquet -> its meaning."""
+_WRENCH = Field(  # force and torque at the wrist, without zeroing
     ("fx", "fy", "fz", "tx", "ty", "tz"),
     "N, Nm",
     "flange",
@@ -89,34 +89,37 @@ FRAMES: Mapping[str, Field] = MappingProxyType(
         "part_poses": Field((), "m", "world", "7 numbers for each of `parts`: (x, y, z, qw, qx, qy, qz)"),
     }
 )
-"""Column of the tables of frames -> what it is."""
+"""Column of the tables of frames -> its meaning."""
 _STEPWISE = ("operation", "undoes", "macro")
-"""What holds from one look to the next; of the rest a frame has what lies between two looks."""
+"""Columns that hold until the next sample; all other columns are interpolated between samples."""
 
 
 class Replay(NamedTuple):
-    """One trial, and what was seen of its replay."""
+    """One trial, with the samples of its replay as frames."""
 
     scene: Scene
     episode: dict[str, Any]
     frames: dict[str, Any]
-    """Column -> one entry a frame; no column without a replay."""
+    """Column -> one entry per frame; empty without a replay."""
 
 
 @final
 class _Recorder:
-    """Looks on at a replay, every 20 ms."""
+    """Samples the state of a replay every 20 ms."""
 
     def __init__(self, scene: Scene) -> None:
         self.plan: Plan | None = None
         self.parts = sorted(scene.work.free)
         self._scene = scene
+        # column -> one entry per sample
         self._looks: dict[str, list[Any]] = {name: [] for name in FRAMES if name != "episode"}
 
     def hooks(self) -> Hooks:
+        # called by the replay
         return Hooks(before_replay=self._planned, after_tick=self._tick)
 
     def _planned(self, plan: Plan) -> None:
+        # the plan that is executed
         self.plan = plan
 
     def _tick(self, data: Any, phase: Phase) -> None:
@@ -137,12 +140,12 @@ class _Recorder:
             column.append(entry)
 
     def frames(self) -> dict[str, Any]:
-        """`FPS` frames a second, by what was seen before and after each."""
+        """Return the samples as `FPS` frames per second of simulated time; empty without a replay."""
         t = np.array(self._looks["t_s"])
         if not len(t):
             return {}
-        at = t[0] + np.arange(int((t[-1] - t[0]) * FPS + 1e-6) + 1) / FPS
-        before = np.searchsorted(t, at + 1e-9, side="right") - 1
+        at = t[0] + np.arange(int((t[-1] - t[0]) * FPS + 1e-6) + 1) / FPS  # times of the frames
+        before = np.searchsorted(t, at + 1e-9, side="right") - 1  # index of the last sample not after each frame
         frames: dict[str, Any] = {}
         for name, looks in self._looks.items():
             if name in _STEPWISE:
@@ -150,19 +153,19 @@ class _Recorder:
                 continue
             x = np.array(looks, dtype=np.float64)
             if name == "part_poses":
-                # A quaternion and its negative are one turn; what is between two is between near ones.
+                # a quaternion and its negative are one rotation: choose signs so that neighbours are near each other
                 turned = np.einsum("tpi,tpi->tp", x[1:, :, 3:], x[:-1, :, 3:]) < 0.0
                 x[1:, :, 3:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)[:, :, None]
             x = np.column_stack([np.interp(at, t, column) for column in x.reshape(len(t), -1).T])
             if name == "part_poses":
                 turns = x.reshape(len(at), -1, 7)[:, :, 3:]
-                turns /= np.linalg.norm(turns, axis=2, keepdims=True)
-            frames[name] = x if looks and np.ndim(looks[0]) else x[:, 0]
+                turns /= np.linalg.norm(turns, axis=2, keepdims=True)  # linear interpolation shortens quaternions
+            frames[name] = x if looks and np.ndim(looks[0]) else x[:, 0]  # one number per frame has shape (n,)
         return frames
 
 
 def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Iterator[Replay]:
-    """Run trials, each in the scene of its scenario.
+    """Run trials, each in the scene of its scenario, and record them.
 
     Raises:
         InputError: A trial cannot be run.
@@ -182,10 +185,10 @@ def write_parquet(found: Iterable[Replay], about: DatasetMetadata, out: Path) ->
     """Write replays as Parquet tables, and the card.
 
     Returns:
-        How many trials there are, and how many of them are right.
+        The number of trials, and the number of successes.
 
     Raises:
-        OSError: Something cannot be written.
+        OSError: A file cannot be written.
     """
     (out / "frames").mkdir(parents=True)
     episodes: list[dict[str, Any]] = []
@@ -203,10 +206,15 @@ def write_parquet(found: Iterable[Replay], about: DatasetMetadata, out: Path) ->
 
 
 def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMetadata:
-    """What is known of replays in these scenes, all of one arm."""
+    """Return the metadata of replays in these scenes, which all have one arm.
+
+    Args:
+        command: The command line that makes the data set.
+        robot: Name of the arm.
+    """
     arm = found[0].arm
     model = found[0].work.model
-    slots = range(max(len(scene.work.free) for scene in found))
+    slots = range(max(len(scene.work.free) for scene in found))  # smaller assemblies leave slots empty
     names = tuple(f"part{k}_{axis}" for k in slots for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
     joints = Field((*arm.joints, *arm.fingers), "rad or m", "", "positions of the arm's joints, and of the fingers")
     commands = tuple(model.actuator(k).name.removeprefix("arm/") for k in range(model.nu))
@@ -238,15 +246,20 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMe
 def replay_rollouts(
     found: Iterable[Replay], about: DatasetMetadata, say: Callable[[str], None]
 ) -> Iterator[RecordedEpisode]:
-    """Replays as episodes, but for those of which nothing was carried out."""
+    """Yield replays as episodes with observations and actions; trials in which nothing moved are left out.
+
+    Args:
+        say: Called with a sentence about each trial that is left out.
+    """
     width = len(about.fields["environment_state"].names)
     for scene, episode, frames in found:
-        n = len(frames.get("t_s", ())) - 1
+        n = len(frames.get("t_s", ())) - 1  # number of actions: one fewer than frames
         if n < 1:
             say(f"Trial {episode['seed']} is left out, as nothing moved: {episode['sentence']}.")
             continue
+        # identity poses in the slots without a part
         rest = np.tile([0, 0, 0, 1, 0, 0, 0], (n + 1, (width - frames["part_poses"].shape[1]) // 7))
-        done = [
+        done = [  # undone operations are negative
             (k or 0) * (-1 if undoes else 1) for k, undoes in zip(frames["operation"], frames["undoes"], strict=True)
         ]
         rewards = np.zeros(n)
@@ -269,7 +282,7 @@ def replay_rollouts(
 def _episode(
     settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, row: TrialRecord, recorder: _Recorder
 ) -> dict[str, Any]:
-    """What is said of one episode."""
+    """Return the columns of one episode: record, observation, truth and plan."""
     seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed, settings.secret_seed)
     plan = recorder.plan
     return {
@@ -286,4 +299,5 @@ def _episode(
 
 
 def _flat(poses: Array) -> list[float]:
+    """Return poses, (n, 4, 4), as a list of 7 n numbers."""
     return [float(x) for x in pose.pack(poses).ravel()]

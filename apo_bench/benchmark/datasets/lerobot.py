@@ -1,8 +1,8 @@
 """Write episodes as a LeRobot data set v3.0.
 
-The format is that of `huggingface/lerobot`, `src/lerobot/datasets`: frames of all episodes one after the other in
-`data`, one row group an episode; what is known of each episode, with its statistics, in `meta/episodes`; tasks by their
-words as pandas reads them; statistics of all frames in `meta/stats.json`.
+The format is that of `huggingface/lerobot`, `src/lerobot/datasets`. `data` has the frames of all episodes, one row
+group per episode. `meta/episodes` describes each episode, with statistics. `meta/tasks.parquet` has the tasks with
+their words as the pandas index, and `meta/stats.json` the statistics of all frames.
 
 Needs the package pyarrow.
 """
@@ -24,13 +24,13 @@ from apo_bench.io import replace_file, write_columns, write_file
 
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _CHUNK = 1000
-"""Files of a folder."""
+"""Number of files in a folder."""
 _FRAMES_OF_A_FILE = 200_000
-"""Some 60 MB."""
+"""Frames after which a new file begins, some 60 MB."""
 _QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
 _TOGETHER = "observation.environment_state"
-"""Policies of LeRobot look at the state, at this and at pictures, and at no other observation."""
-_OWN = {
+"""Name of an observation that joins several: policies of LeRobot use only the state, this and images."""
+_OWN = {  # columns of one number
     "next.reward": ("float32", "reward of the action"),
     "next.done": ("bool", "whether the episode is over after the action"),
     "next.success": ("bool", "whether it is over and right, by the judge"),
@@ -41,8 +41,8 @@ _OWN = {
     "index": ("int64", "from 0, over all episodes"),
     "task_index": ("int64", "line of meta/tasks.parquet"),
 }
-"""Columns of one number -> its type, and what it is."""
-_OF_EPISODE = {
+"""Column of one number -> its type and its meaning."""
+_OF_EPISODE = {  # column of the table of episodes -> its meaning
     "episode_index": "from 0",
     "tasks": "what is done, in words",
     "length": "how many frames there are",
@@ -56,20 +56,21 @@ _OF_EPISODE = {
 
 
 def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
-    """Write episodes, and the card; a frame is what was seen before an action, and the action.
+    """Write episodes, and the card; a frame is the observation before an action, and the action.
 
     Returns:
-        How many episodes there are, and how many of them are right.
+        The number of episodes, and the number of successes.
 
     Raises:
-        OSError: Something cannot be written.
+        OSError: A file cannot be written.
     """
     fields = {_called(name): field for name, field in about.fields.items()} | {"action": about.action}
+    # observations to join
     apart = [] if _TOGETHER in fields else [name for name in fields if name not in (_called("agent_pos"), "action")]
     if apart:
         names = tuple(name for each in apart for name in fields[each].names)
         fields[_TOGETHER] = Field(names, "", "", f"{' and '.join(apart)} in one row")
-    schema = pa.schema(
+    schema = pa.schema(  # types of the columns
         [(n, pa.float32() if len(f.names) == 1 else pa.list_(pa.float32(), len(f.names))) for n, f in fields.items()]
         + [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, (kind, _) in _OWN.items()]
     )
@@ -106,9 +107,15 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
 
 
 def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> dict[str, Array]:
-    """The columns of one episode, (T,) or (T, k)."""
+    """Return the columns of one episode with T frames, (T,) or (T, k).
+
+    Args:
+        before: Number of frames of all episodes before.
+        task: Number of the task.
+    """
     n = len(rollout.actions)
     last = np.arange(n) == n - 1
+    # without the observation after the last action
     seen = {_called(name): numbers[:-1] for name, numbers in rollout.observations.items()}
     own = (
         *(rollout.rewards, last, last & bool(rollout.more["success"]), np.full(n, rollout.seed)),
@@ -118,19 +125,19 @@ def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> 
 
 
 def _called(name: str) -> str:
-    """What LeRobot calls an observation."""
+    """Return the name of an observation in LeRobot."""
     return f"observation.{'state' if name == 'agent_pos' else name}"
 
 
 def _arrow(column: Array, kind: Any) -> Any:
-    """A column of this type; one of lists of as many numbers."""
+    """Return a column as an Arrow array of this type; vectors become lists of fixed size."""
     if pa.types.is_fixed_size_list(kind):
         return pa.FixedSizeListArray.from_arrays(pa.array(column.ravel().astype(np.float32)), type=kind)
     return pa.array(column.ravel()).cast(kind)
 
 
 def _statistics(column: Array) -> dict[str, list[float]]:
-    """Of a column (T,) or (T, k), for each of its numbers, as LeRobot calls them."""
+    """Return the statistics of each number of a column, (T,) or (T, k), under LeRobot's names."""
     x = np.asarray(column, dtype=np.float64).reshape(len(column), -1)
     found = {"min": x.min(axis=0), "max": x.max(axis=0), "mean": x.mean(axis=0), "std": x.std(axis=0)}
     found |= {f"q{round(100 * q):02d}": np.quantile(x, q, axis=0) for q in _QUANTILES}
@@ -146,6 +153,7 @@ def _write_meta(
     episodes: list[dict[str, Any]],
     frames: int,
 ) -> None:
+    """Write the folder `meta`: episodes, tasks, statistics, and the description `info.json`."""
     folder = out / "meta" / "episodes" / "chunk-000"
     folder.mkdir(parents=True)
     names = [*episodes[0]] if episodes else []
@@ -180,7 +188,7 @@ def _write_meta(
 
 
 def _write_tasks(tasks: Mapping[str, int], path: Path) -> None:
-    """Tasks, which pandas reads with their words as the index."""
+    """Write tasks so that pandas reads their words as the index."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy_kind, "metadata": None}
         for name, kind, numpy_kind in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

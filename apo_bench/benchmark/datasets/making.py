@@ -1,6 +1,6 @@
 """Make a data set of trials in one of three formats.
 
-Insertions as data: what a policy saw and did in `APOInsert-v0`, and what the judge said.
+The trials are replays, or insertions: observations and actions of a policy in `APOInsert-v0`, with the judge's verdict.
 """
 
 import shutil
@@ -24,14 +24,15 @@ from apo_bench.names import resolve
 from apo_bench.records import TrialConfig
 from apo_bench.trial.stages import scene_of
 
-_FRAME = "way in"
+_FRAME = "way in"  # the frame of the insertion axis
 
 
 def _named(*kinds: str) -> tuple[str, ...]:
+    """Return the names of the six numbers of each kind of twist."""
     return tuple(f"{kind}_{axis}" for kind in kinds for axis in ("x", "y", "z", "rx", "ry", "rz"))
 
 
-_FIELDS: Mapping[str, Field] = MappingProxyType(
+_FIELDS: Mapping[str, Field] = MappingProxyType(  # observations and actions of `APOInsert-v0`
     {
         "agent_pos": Field(
             (*_named("tip", "lag"), "opening"),
@@ -55,7 +56,7 @@ _FIELDS: Mapping[str, Field] = MappingProxyType(
         ),
     }
 )
-_OF_EPISODE: Mapping[str, str] = MappingProxyType(
+_OF_EPISODE: Mapping[str, str] = MappingProxyType(  # column of the table of episodes -> its meaning
     {
         "seed": "number of the trial",
         "scenario": "the assembly",
@@ -71,18 +72,24 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(
 def insertions(
     trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
 ) -> tuple[DatasetMetadata, Iterator[RecordedEpisode]]:
-    """Have a policy insert, trial by trial, all scenarios one after the other.
+    """Let a policy insert parts, trial by trial.
 
     Args:
-        policy: One of `POLICIES`, or `module:function` of the environment and what is seen, or `module:class`, of which
-            each episode makes one.
-        say: Is told in a sentence of each trial that does not come to the operation.
+        trials: Trials in the order of their scenarios; at least one.
+        policy: One of `POLICIES`; or `module:function` of environment and observation; or `module:class`, of which each
+            episode makes an instance.
+        command: The command line that makes the data set.
+        say: Called with a sentence about each trial that fails before the operation.
+
+    Returns:
+        The metadata, and the episodes, which run when they are iterated.
 
     Raises:
         InputError: There is no such policy, or the environment does not take a setting.
     """
     act = resolve(policy, POLICIES, "policy")
     env = insert_env(trials[0])
+    # settings, to make the environment again
     made = ", ".join(f"{name}={x!r}" for name, x in (env.spec.kwargs if env.spec else {}).items() if name != "scenario")
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
     fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
@@ -104,6 +111,7 @@ def insertions(
 def _rollouts(
     trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]
 ) -> Iterator[RecordedEpisode]:
+    """Yield the episodes; a new environment is made for each new scenario."""
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
@@ -116,7 +124,7 @@ def _rollouts(
         scenario, k = env.scene.scenario, env.operation
         with _policy(policy):
             decide = act() if isinstance(act, type) else act
-        sights, actions, rewards = [seen], [], []
+        sights, actions, rewards = [seen], [], []  # observations, actions, rewards
         over = False
         while not over:
             with _policy(policy):
@@ -139,7 +147,7 @@ def _rollouts(
 
 @contextmanager
 def _policy(policy: str) -> Iterator[None]:
-    """Name a policy, which may be the user's, and its line in what it raises."""
+    """Convert an exception of a policy into an `InputError` that names the policy and its line."""
     try:
         yield
     except RAISED as error:
@@ -161,24 +169,24 @@ def make_dataset(
 ) -> tuple[int, int]:
     """Run trials and write them, with a card `README.md`.
 
-    The same trials give the same bytes on one machine. A signal (Ctrl-C, SIGTERM) or a policy that raises ends the data
-    set early: after the trial that runs, with the episodes that were made. A second signal, or a full disk, ends it at
+    The same trials give the same bytes on one machine. A signal (Ctrl-C, SIGTERM) or an exception in a policy ends the
+    data set early: after the current trial, with the episodes made so far. A second signal, or a full disk, ends it at
     once, and the file `UNFINISHED` stays in the folder.
 
     Args:
         trials: At least one.
-        out: A folder that is not there yet, or is empty.
-        command: What the card says it was made by.
+        out: A folder that does not exist, or is empty.
+        command: The command line that the card states.
         form: One of `FORMATS`.
-        policy: Insertions by this policy; None: replays.
-        say: Is told in a sentence of each trial that makes no episode.
+        policy: Policy that inserts parts; None records replays.
+        say: Called with a sentence about each trial that makes no episode.
 
     Returns:
-        How many episodes there are, and how many of them are right.
+        The number of episodes, and the number of successes.
 
     Raises:
-        InputError: The folder holds something, a trial cannot be run, none makes an episode, or a package is missing.
-        KeyboardInterrupt: A signal asked for an end.
+        InputError: The folder holds files, a trial cannot be run, none makes an episode, or a package is missing.
+        KeyboardInterrupt: A signal ended the run.
     """
     require_known("format", form, FORMATS)
     require(
@@ -194,7 +202,7 @@ def make_dataset(
     elif not has_parquet():
         raise missing_package(f"the format {form}", "pyarrow")
     existed = out.exists()
-    ends: list[BaseException] = []
+    ends: list[BaseException] = []  # the exceptions that ended the run early
     found: Iterator[Any]
     if policy is not None:
         about, found = insertions(trials, policy, command, say)
@@ -209,7 +217,7 @@ def make_dataset(
         else:
             rollouts = found if policy is not None else replay_rollouts(found, about, say)
             counted = _write_rollouts(form, rollouts, about, out)
-    if not counted[0]:
+    if not counted[0]:  # without an episode, the folder is left as it was
         for each in out.iterdir() if out.is_dir() else ():
             shutil.rmtree(each) if each.is_dir() else each.unlink()
         if out.is_dir() and not existed:
@@ -225,6 +233,7 @@ def make_dataset(
 def _write_rollouts(
     form: str, rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, out: Path
 ) -> tuple[int, int]:
+    """Write episodes as `minari` or `lerobot`, and return the numbers of episodes and successes."""
     if form == "minari":
         return write_minari(rollouts, about, out)
     from apo_bench.benchmark.datasets.lerobot import write_lerobot
@@ -234,7 +243,7 @@ def _write_rollouts(
 
 @contextmanager
 def _unfinished(out: Path) -> Iterator[None]:
-    """Until the block has ended well, a file in the folder says that the data set is not finished."""
+    """Keep a file `UNFINISHED` in the folder until the block has ended without an exception."""
     out.mkdir(parents=True, exist_ok=True)
     mark = out / "UNFINISHED"
     write_file(mark, "This data set is not finished: `apo-bench dataset make` still runs, or was ended.\n")
@@ -243,7 +252,7 @@ def _unfinished(out: Path) -> Iterator[None]:
 
 
 def _to_the_end(found: Iterable[Any], ends: list[BaseException], check: Check) -> Iterator[Any]:
-    """What is found until something ends it, which is added to the list: the data set is finished first."""
+    """Yield what is found until an exception, which is appended to `ends`, so that the data set is completed first."""
     try:
         for each in found:
             yield each

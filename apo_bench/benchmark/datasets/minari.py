@@ -1,7 +1,7 @@
 """Write episodes as a Minari data set.
 
-The format is that of `Farama-Foundation/Minari`, `minari/dataset/_storages/hdf5_storage.py`: a group for each episode,
-with what was seen before the first action and after each; beside it the spaces and what is known of all.
+The format is that of `Farama-Foundation/Minari`, `minari/dataset/_storages/hdf5_storage.py`: one group per episode,
+with the observation before the first action and after each, and a file with the spaces and the metadata.
 """
 
 import json
@@ -16,13 +16,13 @@ from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEp
 from apo_bench.errors import missing_package
 from apo_bench.io import replace_file, write_file
 
-_OWN = {
+_OWN = {  # column -> its meaning
     "rewards": "reward of each action",
     "terminations": "whether the episode is over after the action",
     "truncations": "never: an episode ends by itself",
     "infos/success": "whether it is over and right, by the judge, before the first action and after each",
 }
-_OF_EPISODE = {
+_OF_EPISODE = {  # attribute of an episode -> its meaning
     "id": "from 0",
     "seed": "number of the trial",
     "total_steps": "how many actions",
@@ -34,7 +34,7 @@ def load_h5py() -> Any:
     """Import h5py.
 
     Raises:
-        InputError: It is not installed.
+        InputError: The package is not installed.
     """
     try:
         import h5py
@@ -47,11 +47,11 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
     """Write episodes, and the card.
 
     Returns:
-        How many episodes there are, and how many of them are right.
+        The number of episodes, and the number of successes.
 
     Raises:
         InputError: The package h5py is not installed.
-        OSError: Something cannot be written.
+        OSError: A file cannot be written.
     """
     h5py = load_h5py()
     folder = out / "data"
@@ -91,7 +91,7 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
 
 
 def _add(group: Any, rollout: RecordedEpisode, episode: int) -> None:
-    """One episode."""
+    """Write one episode into its HDF5 group."""
     rewards = np.asarray(rollout.rewards, dtype=np.float64)
     of_rewards = {f"rewards_{name}": getattr(rewards, name)() for name in ("max", "min", "mean", "std", "sum")}
     told = {name: _plain(x) for name, x in rollout.more.items() if x is not None}
@@ -100,19 +100,19 @@ def _add(group: Any, rollout: RecordedEpisode, episode: int) -> None:
         group.create_dataset(f"observations/{name}", data=numbers.astype(np.float32))
     group.create_dataset("actions", data=rollout.actions.astype(np.float32))
     group.create_dataset("rewards", data=rewards)
-    over = np.arange(len(rewards) + 1) == len(rewards)
+    over = np.arange(len(rewards) + 1) == len(rewards)  # one entry more than actions: also before the first action
     group.create_dataset("terminations", data=over[1:])
     group.create_dataset("infos/success", data=over & bool(rollout.more["success"]))
     group.create_dataset("truncations", data=np.zeros(len(rewards), dtype=np.bool_))
 
 
 def _plain(x: Any) -> Any:
-    """Texts in a list as HDF5 takes them."""
+    """Convert a list of texts to a type that HDF5 takes; other values stay."""
     return np.array(x, dtype=object) if isinstance(x, list) and x and isinstance(x[0], str) else x
 
 
 def _box(field: Field) -> dict[str, Any]:
-    """A space of Gymnasium, as Minari writes it."""
+    """Return a field as a `Box` space, in Minari's spelling."""
     high = np.broadcast_to(np.array(field.most, dtype=np.float32), len(field.names))
     shape = [len(field.names)]
     return {"type": "Box", "dtype": "float32", "shape": shape, "low": (-high).tolist(), "high": high.tolist()}

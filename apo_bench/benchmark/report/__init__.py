@@ -1,1 +1,1 @@
-"""The report of a sweep: page, tables and figures."""
+"""The report of a sweep: HTML page, tables and figures."""

@@ -1,7 +1,7 @@
 """The sentences at the top of a report: counts, then conclusions.
 
-No sentence states more than its counts: an interval only with enough seeds, "more often" only if the difference is
-beyond chance, "as often" only if the interval lies close around 0.
+No sentence claims more than its counts support. There is an interval only with enough seeds, "more often" only for a
+significant difference, and "as often" only if the interval lies close around 0.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,20 +29,23 @@ from apo_bench.records import CORRECTOR, knows_truth, uses_contacts
 from apo_bench.records.run.trials import trials_of
 
 ALIKE_WITHIN = 0.05
-"""Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
+"""Two methods count as equal only if the whole interval of their difference lies within this around 0."""
 _AGAINST = ("uncorrected", "paper", "contact", CORRECTOR)
-"""The best method is compared with these; if none of them was tried, with the next best."""
+"""The best method is compared with these methods; if none of them was tried, with the second best."""
 _GIVEN = "given"
-_SAME_TRIAL = (
+_SAME_TRIAL = (  # settings that identify a trial, whatever the method
     *(name for name in CONDITION_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
     "seed",
 )
 _Who = tuple[str, int]
-"""A method, and how often it might look again."""
+"""A method, and the reobservations allowed."""
 
 
 def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
-    """The sentences, with methods in backquotes; of trials with wrong relations only where there are no others."""
+    """Return the sentences, with methods in backquotes.
+
+    Trials with wrong contacts count only if there are no trials with the given ones.
+    """
     results, kinds = _results(records)
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
@@ -65,14 +68,17 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
 
 
 def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
-    """Successes of each method, and what correctors were told: the right relations, or else what there is."""
+    """Return the results of each method, and the contact sources of the trials that count.
+
+    Only trials with the given contacts count; if there are none, those of all contact sources.
+    """
     trials = trials_of(records)
     counts = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
     counted = trials.where(counts & ~trials.holds("method", knows_truth))
     informed = counted.holds("method", uses_contacts)
     kinds = sorted(counted.where(informed).distinct("contact_source")) or [_GIVEN]
     kinds = [_GIVEN] if _GIVEN in kinds else kinds
-    # the one trial of a method that is told nothing would count once for each kind of relations that others hear
+    # a method without contacts has one trial per seed; it is left out if several contact sources count
     here = counted.where(np.where(informed, counted.holds("contact_source", kinds.__contains__), len(kinds) == 1))
     trial = here.groups((*_SAME_TRIAL, *["contact_source"] * (len(kinds) > 1))).of
     methods = here.groups(("method", "max_reobservations"))
@@ -84,12 +90,16 @@ def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
 
 
 def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
-    """The best first, by trials that all have that were tried in half of all conditions or more."""
+    """Return methods with the best first, by the trials that all of them have.
+
+    Methods with less than half as many trials as the largest number are left out.
+    """
     most = max(len(own.trial) for own in results.values())
     widely = {who: own for who, own in results.items() if 2 * len(own.trial) >= most}
     common = reduce(np.intersect1d, (own.trial for own in widely.values()))
 
     def rate(who: _Who) -> float:
+        # without common trials each method counts all of its own
         shared = np.isin(results[who].trial, common) | (len(common) == 0)
         return float(results[who].success[shared].mean())
 
@@ -97,20 +107,20 @@ def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
 
 
 def _named(who: _Who) -> str:
-    """`contact`, or `contact-robust` with 2 reobservations."""
+    """Format a method: `contact`, or `contact-robust` with 2 reobservations."""
     method, reobservations = who
     return f"`{method}`" + f" with {reobservations} reobservations" * (reobservations > 0)
 
 
 def _counted(who: _Who, own: PooledRate) -> str:
-    """`95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %)`."""
+    """Return `contact succeeds in 95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %).`"""
     between = "" if own.seeds < FEWEST_SEEDS else f"; 95 % interval {format_percent_interval(own.interval)}"
     trials = format_count(own.trials, "trial")
     return f"{_named(who)} succeeds in {own.right:,} of {trials} ({format_percent(own.right / own.trials)}{between})."
 
 
 def _few(own: PooledRate) -> str:
-    """A sentence where there are too few seeds for an interval."""
+    """Return a sentence if there are too few seeds for an interval, else an empty text."""
     if own.seeds >= FEWEST_SEEDS:
         return ""
     seeds = "1 seed is" if own.seeds == 1 else f"{own.seeds} seeds are"
@@ -118,7 +128,7 @@ def _few(own: PooledRate) -> str:
 
 
 def _reach(half: Sequence[HalfLevel]) -> str:
-    """Where its curve over the level falls to one half; of several settings the worst."""
+    """Return a sentence on the noise level at which success falls to one half; of several settings, the worst."""
     if not half:
         return ""
     worst = min(half, key=lambda h: (h.beyond == "above", h.noise_mm or 0.0, h.largest))
@@ -132,7 +142,7 @@ def _reach(half: Sequence[HalfLevel]) -> str:
 
 
 def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
-    """A sentence that counts both, and what that tells; nothing where they have no trial in common."""
+    """Return a sentence that compares the counts of two methods; empty if they have no trial in common."""
     c = contrast(results[ours], results[other])
     if c is None:
         return ""
@@ -144,12 +154,12 @@ def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
 
 
 def _told(ours: _Who, c: Contrast) -> str:
-    """What the counts of a pair tell."""
+    """Return the conclusion from the counts of a pair: more or less often, as often, or undecided."""
     size = f"{100 * abs(c.difference):.1f} points"
     between = f"95 % interval {format_points(c.interval)}"
     if c.sure:
         return f"{_named(ours)} succeeds {'more' if c.difference > 0 else 'less'} often, by {size} ({between})"
-    widest = max(-c.interval.low, c.interval.high)
+    widest = max(-c.interval.low, c.interval.high)  # the end of the interval that is farther from 0
     if widest <= ALIKE_WITHIN:
         return f"as often, to within {100 * widest:.1f} points (95 % interval of the difference)"
     if c.difference == 0.0:

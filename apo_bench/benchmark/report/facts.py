@@ -1,4 +1,4 @@
-"""Settings, versions and inputs of a run, from `run.json` and from the records."""
+"""Tables of the settings, versions and inputs of a run, from `run.json` and from the records."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -8,12 +8,12 @@ from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.records.run.trials import Trials
 
 _LONG = 400
-"""Longer values are cut; the file has them."""
-_SHARED = ("schema", "fidelity", "grasp", "arm", "timestep_s", "clearance_mm")
+"""Longer values are cut; `run.json` has them in full."""
+_SHARED = ("schema", "fidelity", "grasp", "arm", "timestep_s", "clearance_mm")  # settings that a report states once
 
 
 def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> dict[str, Table]:
-    """Tables by their headings."""
+    """Return tables of names and values by their headings; empty ones are left out."""
     seeds = trials.number("seed")
     tables: dict[str, Mapping[str, Any]] = {
         "Records": {
@@ -36,7 +36,7 @@ def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> d
 
 
 def value_words(value: Any) -> str:
-    """A value for people: lists with commas, the rest as JSON."""
+    """Format a value for people: lists with commas, other values as JSON; long ones are cut."""
     text = value if isinstance(value, str) else json.dumps(value)
     if isinstance(value, list | tuple) and not any(isinstance(x, dict | list) for x in value):
         text = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"

@@ -1,4 +1,4 @@
-"""The failures that a report draws."""
+"""Choose the failures that a report draws."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -17,41 +17,42 @@ from apo_bench.records.run.trials import Trials, trials_of
 
 
 class FailurePicture(NamedTuple):
-    """Of one trial."""
+    """A picture of one failed trial."""
 
     row: TrialRecord
     jpeg: bytes
     words: str
-    """How it was made."""
+    """Caption: the moment that the picture shows."""
 
 
 Draw = Callable[[Sequence[TrialRecord], Path, Files], tuple[list[FailurePicture], list[str]]]
-"""Draws failed trials, as `failure_pictures` of `apo_bench.viz` does; the sentences say what could not be drawn."""
+"""Draws failed trials, as `failure_pictures` of `apo_bench.viz`; returns pictures, and why others are missing."""
 
 
 def sample(records: Records, most: int) -> list[TrialRecord]:
-    """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
+    """Choose failures to draw: one per stage and code, the most frequent first, with varied methods and scenarios.
 
-    The same trials, in any order, give the same sample. Those that were not executed have nothing to show.
+    The order of the trials does not matter. Trials without an executed plan have nothing to show.
     """
     trials = trials_of(records)
     failed = (trials.number("success") == 0) & (trials.number("sim_time_s") > 0) & was_executed(trials)
-    failed &= ~np.isnan(trials.number("noise_mm"))
+    failed &= ~np.isnan(trials.number("noise_mm"))  # without observations from files
     ways = trials.where(failed).parts(("failure_stage", "failure_code"))
     chosen: list[TrialRecord] = []
     for way in sorted(ways, key=lambda way: (-len(ways[way]), way))[:most]:
-        shown = Counter(x for row in chosen for x in (row["method"], row["scenario"]))
+        shown = Counter(x for row in chosen for x in (row["method"], row["scenario"]))  # how often each was chosen
         chosen.append(min(_first(ways[way]), key=partial(_order, shown)))
     return chosen
 
 
 def _first(trials: Trials) -> Sequence[TrialRecord]:
-    """The trials of the first seed of each method and scenario."""
+    """Return the trials of the first seed of each method and scenario."""
     firsts = (own.where(own.number("seed") == own.number("seed")[0]) for own in by_method(trials).values())
     return cast(list[TrialRecord], [record for own in firsts for record in own.rows()])
 
 
 def _order(shown: Mapping[str, int], record: TrialRecord) -> tuple[Any, ...]:
+    """Return a sort key that prefers methods and scenarios that were chosen least, then small seeds."""
     often = shown[record["method"]] + shown[record["scenario"]]
     is_uncorrected = record["method"] == "uncorrected"
     return (often, record["seed"], is_uncorrected, make_sort_key(cast(Condition, get_condition(record))))

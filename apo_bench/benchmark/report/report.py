@@ -1,4 +1,4 @@
-"""Write the report of a sweep."""
+"""Write the report of a sweep: page, tables and figures."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -42,46 +42,46 @@ from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
-"""Of a PNG; drawing more takes minutes."""
+"""Most panels of a figure that is also drawn as PNG; more would take minutes."""
 PNG = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations", "detected")
-"""Figures that are also kept as PNG."""
+"""Figures that are also written as PNG."""
 FILES = ("conditions", "pairs", "half_levels", "detected", "gaps", "confusion", "probing", "times")
-"""Tables that are also kept as files; those of `_IF_ANY` only with a line."""
+"""Tables that are also written as files; those of `_IF_ANY` only if they have a line."""
 _IF_ANY = ("detected", "probing", "times")
 _OURS = (*FILES, *PNG, "records", "failure_stages", "gap_before_and_after", "prediction", "timing")
-"""Names of our tables and figures, without endings; `difference_to_..` is ours too."""
+"""Names of tables and figures of a report, without endings; `difference_to_..` is one as well."""
 PAGE = "report.html"
 TABLES = "tables"
 FIGURES = "figures"
 
 
 class Report(NamedTuple):
-    """Where the report of a sweep was written."""
+    """The files of a written report, and its main results."""
 
     page: Path
     answer: str
     """Some sentences, with methods in backquotes."""
     tables: Mapping[str, Path]
-    """As CSV: `conditions` has the rates, `pairs`, `confusion`, ...; with the package pyarrow also as Parquet."""
+    """Name of each table -> its CSV file; with the package pyarrow there is also a Parquet file."""
     figures: tuple[Path, ...]
-    """As SVG, some also as PNG."""
+    """Paths of the figures: SVG, some also PNG."""
     conditions: tuple[ConditionResult, ...]
     confusions: Sequence[Line]
     pictures: int
-    """Failures that were drawn."""
+    """Number of failures that were drawn."""
     no_pictures: tuple[str, ...]
-    """Why others were not."""
+    """Why other failures were not drawn."""
 
 
 def report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> Report:
-    """Write the page, tables and figures into the folder of a sweep; nothing that it names is imported.
+    """Write page, tables and figures into the folder of a sweep; no code that its records name is imported.
 
     Args:
-        pictures: At most this many failures are drawn.
-        draw: Draws failures; without it there is no picture.
+        pictures: Largest number of failures to draw.
+        draw: Draws failures; None draws none.
 
     Raises:
-        InputError: No records there, or the folder cannot be written.
+        InputError: The folder has no records, or cannot be written.
     """
     folder = Path(folder)
     trials = read_trials(folder)
@@ -104,6 +104,7 @@ def report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> R
 def _write(
     folder: Path, trials: Trials, numbers: Summary, failures: Sequence[TrialRecord], draw: Draw | None
 ) -> Report:
+    """Compute all tables and figures, and write them."""
     run = read_run(folder)
     timing = read_timing(folder)
     tables = {
@@ -119,7 +120,7 @@ def _write(
         "times": time_table(tabulate_trial_times(timing)),
         "work": work_table(tabulate_work(timing)),
     }
-    lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))
+    lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))  # for the figures
     drawn = figures(numbers.results, numbers.pairs, list_settings(numbers.results), *lines)
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
@@ -145,7 +146,7 @@ def _write(
             beside=[str(path.relative_to(folder)) for path in (*kept, *paths)],
         )
     )
-    _remove_older(folder, {path.resolve() for path in (*kept, *paths)})
+    _remove_older(folder, {path.resolve() for path in (*kept, *paths)})  # before the page, which only links new files
     write_file(folder / PAGE, html)
     csv = {name: paths[0] for name, paths in written.items()}
     confused = tables["confusion"].items
@@ -155,7 +156,7 @@ def _write(
 
 
 def _remove_older(folder: Path, written: Collection[Path]) -> None:
-    """Remove what an earlier report wrote and this one did not, so that all tables and figures are of the same rows."""
+    """Remove files of an earlier report that this one did not write, so that all files show the same records."""
     for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
         ours = path.stem in _OURS or path.stem.startswith("difference_to_")
         if ours and path.suffix in (".csv", ".parquet", ".svg", ".png") and path.resolve() not in written:
@@ -163,6 +164,6 @@ def _remove_older(folder: Path, written: Collection[Path]) -> None:
 
 
 def _write_rows(trials: Trials, path: Path) -> Path:
-    """The trials themselves, what was predicted in columns of its own."""
+    """Write the trials as Parquet, with the failure prediction in columns of its own."""
     write_columns(list(COLUMNS), [trials.values(name) for name in COLUMNS], path)
     return path

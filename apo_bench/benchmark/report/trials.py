@@ -1,4 +1,4 @@
-"""Words and numbers of a trial for a page."""
+"""Words and numbers that a page shows of a trial."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,11 +21,11 @@ NUMBERS: Mapping[str, str] = {
     "peak_force_n": "peak force [N]",
     "sim_time_s": "simulated [s]",
 }
-"""Numbers of a trial, in the order of a page, with what they are called there."""
+"""Column of a record -> its name on a page, in the order of the page."""
 
 
 def verdict(row: Mapping[str, Any]) -> str:
-    """How a trial ended, in a word or two."""
+    """Return the verdict on a trial in a few words."""
     if row["success"] is None:
         return "excluded"
     if row["success"]:
@@ -34,7 +34,7 @@ def verdict(row: Mapping[str, Any]) -> str:
 
 
 def why(row: Mapping[str, Any]) -> str:
-    """`attach: force_stop, operation 3`; nothing where nothing failed."""
+    """Return stage, code and operation of a failure: `attach: force_stop, operation 3`; empty without a failure."""
     if row["failure_stage"] is None:
         return ""
     where = "" if row["failure_operation"] is None else f", operation {row['failure_operation']}"
@@ -42,7 +42,7 @@ def why(row: Mapping[str, Any]) -> str:
 
 
 def predicted(row: Mapping[str, Any]) -> str:
-    """The prediction of the plan."""
+    """Return the failure prediction of a plan in words; empty without a plan."""
     if row["predicted_fails"] is None:
         return ""
     return (

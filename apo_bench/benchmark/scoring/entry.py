@@ -1,7 +1,7 @@
-"""An entry: what a method scored, in a file that another person's table can read. Schema `apo-bench/entry/1`.
+"""Entries: the scores of a method in a file that other leaderboards can read. Schema `apo-bench/entry/1`.
 
-An entry file may come from a stranger: every text and number has bounds, and what follows from the trials of its cells
-(counts, scores, intervals) must be what they give.
+An entry file may come from a stranger, so every text and number is bounded. Counts, scores and intervals must follow
+from the trials that the entry lists.
 """
 
 import json
@@ -21,14 +21,16 @@ from apo_bench.io import UNSHOWN, read_bytes, write_file
 SCHEMA: Final = "apo-bench/entry/1"
 _LARGEST_BYTES = 4_000_000
 RIGHT, WRONG, EXCLUDED = "10x"
-"""How a cell spells a trial: success, none, or one that does not count since the demonstration itself was not right."""
+"""Letters of trials in a condition: success, failure, or not counted since the demonstration failed."""
 LONGEST_NAME = 200
 _TOLERANCE = 1e-6
-"""Percentage points: a score or an interval may differ by rounding between processors."""
+"""Percentage points by which a score may differ, since processors round differently."""
 
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 Text = Annotated[str, Meta(max_length=4000)]
+# a hash of 16 hexadecimal digits
 Hash = Annotated[str, Meta(pattern=r"^[0-9a-f]{16}\Z")]
+# the trials of a condition, one letter each
 Trials = Annotated[str, Meta(pattern=rf"^[{RIGHT}{WRONG}{EXCLUDED}]+\Z")]
 Count = Annotated[int, Meta(ge=0, le=1_000_000)]
 Percent = Annotated[float, Meta(ge=0.0, le=100.0)]
@@ -36,37 +38,37 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a method scored in one track.
+    """The score of a method in one track.
 
     Raises:
-        InputError: Its numbers are not those of its trials.
+        InputError: Its numbers do not follow from its trials.
     """
 
     track: Hash
     """Hash of the track's file."""
     overall: bool
-    """Whether it counts in the score over all."""
+    """Whether the track counts in the overall score."""
     score: Percent
-    """Mean over cells of the success rate; a plan that is not carried out is no success."""
-    low: Percent
+    """Mean over conditions of the success rate, in percent; a plan that is not executed is no success."""
+    low: Percent  # lower end of the interval
     high: Percent
-    """Of the 95 % interval over seeds."""
+    """Upper end of the 95 % interval over seeds."""
     trials: Count
-    """Those that count."""
+    """Number of trials that count."""
     executed: Count
-    """Those whose plan was carried out."""
+    """Number of those whose plan was executed."""
     predicted_success: Share | None
     """Mean predicted success of the plans; None without predictions."""
     brier: Share | None
-    """Mean squared difference of predicted success and success, of executed plans."""
+    """Mean squared difference of predicted success and success over executed plans."""
     rows: Hash
-    """Over the rows, in any order."""
+    """Hash of the records, in any order."""
     code: Hash
-    """The same over the source files and package versions they were made with."""
+    """Hash of the source files and package versions that made them."""
     secret_seed: Hash | None
-    """Hash of the secret that the trials were drawn with; None for trials that everybody can draw."""
+    """Hash of the secret seed of the trials; None for trials that anyone can draw."""
     cells: Mapping[Text, Trials]
-    """Settings of a cell -> its trials, one character each, the first seed first."""
+    """Settings of a condition -> its trials, one letter each, by seed."""
 
     def __post_init__(self) -> None:
         trials = "".join(self.cells.values())
@@ -91,29 +93,29 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def when_executed(self) -> float | None:
-        """Success rate of the plans that were carried out, in percent; None without one."""
+        """Success rate of the executed plans, in percent; None without any."""
         right = sum(trials.count(RIGHT) for trials in self.cells.values())
         return 100.0 * right / self.executed if self.executed else None
 
 
 class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What a method scored.
+    """The scores of a method in one or several tracks.
 
     Raises:
-        InputError: A text in it cannot be shown.
+        InputError: A text has characters that cannot be shown.
     """
 
     schema: Literal["apo-bench/entry/1"]
     name: Name
-    """What the table calls it."""
+    """The name in tables."""
     method: Text
-    """As rows spell it."""
+    """The method, as records spell it."""
     command: Text
-    """The command line that made it."""
+    """The command line that made the entry."""
     quick: bool
     """Whether it ran the few trials of `--quick`, which are no score."""
     versions: Annotated[Mapping[Name, Name], Meta(max_length=50)]
-    """Of the packages that matter, and of Python."""
+    """Versions of Python and of the packages that affect records."""
     machine: Name
     tracks: Annotated[Mapping[Name, TrackScore], Meta(min_length=1, max_length=50)]
     real: bool = False
@@ -126,8 +128,10 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
     @property
     def overall(self) -> tuple[float, float, float] | None:
-        """Mean over the tracks that count, in percent, and its 95 % interval, tracks taken for independent; None where
-        there is none."""
+        """Mean score over the tracks that count, in percent, and the ends of its 95 % interval; None without any.
+
+        The tracks are treated as independent: the half widths of their intervals add as squares.
+        """
         those = [track for track in self.tracks.values() if track.overall]
         if not those:
             return None
@@ -141,7 +145,7 @@ def check_name(called: str, name: str) -> None:
     """Raise an `InputError` unless an entry can hold a name.
 
     Args:
-        called: What it names, for the message: `entry`.
+        called: The kind of name, for the message: `entry`.
     """
     require(
         0 < len(name) <= LONGEST_NAME and not UNSHOWN.search(name),
@@ -160,10 +164,10 @@ def write_entry(entry: Entry, path: str | Path) -> None:
 
 
 def read_entry(path: str | Path) -> Entry:
-    """An entry out of a file.
+    """Read an entry from a file.
 
     Raises:
-        InputError: It cannot be read, or is something else.
+        InputError: The file cannot be read, or is no entry.
     """
     try:
         return msgspec.json.decode(read_bytes(path, "entry", _LARGEST_BYTES), type=Entry)
@@ -174,24 +178,26 @@ def read_entry(path: str | Path) -> Entry:
 
 
 def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
-    """Mean over cells of the success rate, in percent, and its 95 % interval over seeds.
+    """Return the mean over conditions of the success rate, in percent, and the ends of its 95 % interval over seeds.
 
-    Cells in which no trial counts are left out; 0 (0 to 100) without any. Trials with the same place in their cells
-    have the same seed, as all grids of a track begin with the same one.
+    Conditions in which no trial counts are left out; without any other the result is 0, 0, 100. Trials at the same
+    position have the same seed, since all grids of a track begin with the same seed.
     """
     rates = [trials.count(RIGHT) / n for trials in cells.values() if (n := len(trials) - trials.count(EXCLUDED))]
     if not rates:
         return 0.0, 0.0, 100.0
     score = 100.0 * sum(rates) / len(rates)
+    # the position of a trial stands for its seed
     seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
     success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
     results = Results(np.arange(len(seeds)), seeds, success.astype(float))
     low, high = pool_rate(results).interval
+    # the interval of the pooled rate, widened to contain the mean over conditions
     return score, min(100.0 * low, score), max(100.0 * high, score)
 
 
 def form_of(entry: Entry) -> dict[str, Any]:
-    """An entry without its single trials, for `--json`."""
+    """Return an entry without its single trials, for `--json`."""
     form: dict[str, Any] = msgspec.to_builtins(entry)
     for track in form["tracks"].values():
         del track["cells"]

@@ -1,4 +1,4 @@
-"""The leaderboard: a table of entries with scores and intervals."""
+"""The leaderboard: a page with a table of entries, their scores and intervals, and a figure."""
 
 import warnings
 from collections import Counter
@@ -29,12 +29,12 @@ _RATES = (
 _BRIER = "Brier score of the predicted success in each track: 0 is best, 0.25 is a coin."
 _RUNS = "The file of each entry also has the hashes of tracks, code and records."
 _MOST_SQUARES = 50
-"""Entries, or tracks, that the figure shows; the tables have all."""
-_LONGEST_LABEL = 30
+"""Most entries, and most tracks, in the figure; the tables have all."""
+_LONGEST_LABEL = 30  # letters of a label of the figure
 
 
 class Line(NamedTuple):
-    """An entry in the table."""
+    """A line of the table: an entry with its place."""
 
     place: int
     entry: Entry
@@ -47,7 +47,7 @@ class Line(NamedTuple):
 
 
 def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset()) -> list[Line]:
-    """Entries with the best first: those that entered more of the tracks that count stand before others.
+    """Rank entries: by the number of tracks that count, then by overall score, then by name.
 
     Args:
         secret_seeds: Hashes of the secret seeds with which the author of the table drew trials.
@@ -59,9 +59,12 @@ def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset())
 
 @check_arguments
 def read_entries(folder: str | Path) -> tuple[list[Entry], list[str]]:
-    """The entries of a folder (`*.json`), and a sentence for each file that is left out.
+    """Read the entries of a folder (`*.json`).
 
-    A file is left out if it is not an entry, or is of another version of a track than most entries are.
+    A file is left out if it is no entry, or if it has another version of a track than most entries.
+
+    Returns:
+        The entries, and a sentence for each file that was left out.
 
     Raises:
         InputError: No file is an entry.
@@ -95,7 +98,7 @@ def write_leaderboard(entries: Sequence[Entry], out: str | Path, secret_seeds: f
     """Write the page, in Markdown, and its figure next to it.
 
     Args:
-        entries: At least one, as `read_entries` gives them.
+        entries: At least one, as `read_entries` returns them.
 
     Raises:
         InputError: The figure cannot be written.
@@ -110,7 +113,7 @@ def write_leaderboard(entries: Sequence[Entry], out: str | Path, secret_seeds: f
 
 
 def leaderboard_table(lines: Sequence[Line]) -> Table:
-    """One line for each entry: its score over all tracks that count."""
+    """Return the main table: one line per entry, with its overall score."""
     return Table(
         lines,
         (
@@ -124,26 +127,28 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
 
 
 def _version(track: TrackScore) -> tuple[str, bool]:
-    """Hash of a track's file, and whether the track counts in the score over all."""
+    """Return what distinguishes versions of a track: its hash, and whether it counts in the overall score."""
     return track.track, track.overall
 
 
 def _used_versions(entries: Sequence[Entry]) -> dict[str, tuple[str, bool]]:
-    """The version of each track that most entries have; of equally many that of the package, else the first."""
+    """Return the most frequent version of each track; in a tie that of the package, else the first."""
     stated = group_by((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
     for name in set(stated) & set(track_names()):
         own = read_track(name)
+        # False sorts first: the version of the package
         stated[name].sort(key=lambda version: version != (own.hash, own.overall))
     return {name: Counter(versions).most_common(1)[0][0] for name, versions in stated.items()}
 
 
 def _tracks(entries: Sequence[Entry]) -> list[str]:
-    """Names of all tracks, those that count first."""
+    """Return the names of all tracks, those that count first."""
     overall = {name: track.overall for entry in entries for name, track in entry.tracks.items()}
     return sorted(overall, key=lambda name: (not overall[name], name))
 
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
+    """Yield the lines of the page in Markdown."""
     entry = TableColumn("name", "entry", "entry.name", words=True)
     rates = (entry, *(TableColumn(name, name, partial(_score_words, name)) for name in tracks))
     brier = (entry, *(TableColumn(name, name, partial(_brier, name)) for name in tracks))
@@ -165,9 +170,9 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
 
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
-    """A square for every entry and track, darker where more trials succeeded, with its number."""
+    """Draw a matrix of entries and tracks; each cell is shaded by its score and shows it."""
     with use_figure_style({"font.size": 9.0}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a box replaces a letter that the font does not have
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(0.72 * len(tracks) + 3.0, 0.42 * len(lines) + 2.0), layout="constrained")
@@ -197,7 +202,7 @@ def _overall(entry: Entry) -> str | None:
 
 
 def _score_words(name: str, line: Line) -> str | None:
-    """The score of an entry in a track, as text."""
+    """Format the score of an entry in a track with its interval; in brackets, the rate of executed plans."""
     if (track := line.entry.tracks.get(name)) is None:
         return None
     executed = track.when_executed

@@ -1,9 +1,9 @@
-"""A program in any language as a corrector, by one line of JSON in and out.
+"""Run a program in any language as a corrector: one line of JSON in, one line of JSON out.
 
-A request, `apo-bench/request/1`, is all that a corrector may use: an observation as files have it, with `carries` and
-`contacts` (pairs of `part.face`) in each operation, `faces` (`part.face` -> a point and a direction in the frame of the
-part, radii where it is round), `fixed` parts, and an `id`. The answer is `{"poses": [pose, ...]}`, one pose
-(`position_mm`, `quaternion_wxyz`) for each operation.
+A request, `apo-bench/request/1`, holds everything that a corrector may use: an observation as in files, with `carries`
+and `contacts` (pairs of `part.face`) in each operation, `fixed` parts, an `id`, and `faces`. A face (`part.face`) has a
+point and a direction in the frame of its part, and radii if it is round. The answer is `{"poses": [pose, ...]}`, one
+pose (`position_mm`, `quaternion_wxyz`) per operation.
 """
 
 import hashlib
@@ -31,10 +31,10 @@ from apo_bench.names import own_modules_in
 REQUEST = "apo-bench/request/1"
 LARGEST_ANSWER_BYTES = 16_000_000
 ANSWER_LIMIT_S = 120.0
-"""A program that takes longer is ended."""
+"""Time limit of one answer."""
 _ENVIRONMENT = ("PATH", "LANG")
-"""The environment of a program; `env NAME=value program` as command gives it more."""
-_HEX = 32
+"""Variables that a program gets from the environment; the command `env NAME=value program` adds others."""
+_HEX = 32  # digits of the id of a request
 _MM = 1e3
 _MODULE = """
 '''Made by `apo-bench score`.'''
@@ -49,14 +49,14 @@ corrector = partial(ask_program, {words}, {folder!r})
 
 @contextmanager
 def program_method(command: str, folder: Path) -> Iterator[str]:
-    """Name a program as a method, `module:name`, for a while; a small module in a folder runs it.
+    """Name a program as a method, `module:name`, for the duration of the context; a generated module runs it.
 
     Args:
-        command: A program with its arguments, as in a shell but started without one, in the current folder.
+        command: A program with its arguments, quoted as in a shell; it starts in the current folder, without a shell.
         folder: Where the module is written.
 
     Raises:
-        InputError: No such program.
+        InputError: There is no such program.
     """
     try:
         words = tuple(shlex.split(command))
@@ -73,18 +73,18 @@ def program_method(command: str, folder: Path) -> Iterator[str]:
 
 
 def ask_program(command: tuple[str, ...], folder: str, observation: Observation) -> Array:
-    """The poses that a program makes of an observation, (n, 4, 4), world frame, [m].
+    """Ask a program to correct an observation; return its poses, (n, 4, 4), world, [m].
 
     Args:
         command: The program and its arguments.
-        folder: Where it starts.
+        folder: The folder that it starts in.
 
     Raises:
-        InputError: It cannot be started, fails, takes too long, or answers something else.
+        InputError: The program cannot be started, fails, takes too long, or gives no valid answer.
     """
     program = f"the program '{command[0]}'"
     environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
-    # files, not pipes: the program may write before it reads, and as much as it likes
+    # files, not pipes: the program may write before it reads, and any amount, without a deadlock
     with tempfile.TemporaryFile() as request, tempfile.TemporaryFile() as written:
         request.write(f"{request_line(observation)}\n".encode())
         request.seek(0)
@@ -96,7 +96,7 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
         except OSError as error:
             raise InputError(f"{program} cannot be run ({error}).") from error
         written.seek(0)
-        answer = written.read(LARGEST_ANSWER_BYTES + 1)
+        answer = written.read(LARGEST_ANSWER_BYTES + 1)  # one byte more than allowed, to detect more
     require(
         len(answer) <= LARGEST_ANSWER_BYTES,
         f"{program} wrote more than {LARGEST_ANSWER_BYTES / 1e6:g} MB; one line of JSON is needed.",
@@ -112,20 +112,21 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
 
 
 def request_line(observation: Observation) -> str:
-    """A request on one line; its `id` is a hash of all else."""
+    """Return a request as one line of JSON; its `id` is a hash of the rest."""
     form = _request_form(observation)
     text = json.dumps(form, sort_keys=True, allow_nan=False)
     return json.dumps({"id": hashlib.sha256(text.encode()).hexdigest()[:_HEX], **form}, allow_nan=False)
 
 
 def _request_form(observation: Observation) -> dict[str, Any]:
-    """A request without its `id`: the form of an observation, with contacts and faces in place of a scenario."""
+    """Return a request without its `id`: an observation as in files, with contacts and faces instead of a scenario."""
     assembly = observation.assembly
     form = observation_form(observation, "")
     del form["scenario"]
     for entry, operation in zip(form["operations"], assembly.operations, strict=True):
         entry["carries"] = list(operation.carries)
         entry["contacts"] = [[str(of) for of in contact] for contact in operation.contacts]
+    # a dictionary, to keep their order
     touching = {of: None for operation in assembly.operations for contact in operation.contacts for of in contact}
     faces = {str(of): _face_form(assembly.face_of(of)) for of in touching}
     return {**form, "schema": REQUEST, "fixed": sorted(assembly.fixed), "faces": faces}
@@ -137,7 +138,7 @@ class _Answer(FileTable, frozen=True, kw_only=True):
 
 
 def _face_form(face: Face | RoundFace) -> dict[str, Any]:
-    """A face in the frame of its part: a flat one by a point and its outward normal, a round one by its axis."""
+    """Describe a face in the frame of its part: a flat one by point and outward normal, a round one by its axis."""
     if isinstance(face, Face):
         return {"kind": "plane", "point_mm": (face.outline.mean(axis=0) * _MM).tolist(), "normal": face.normal.tolist()}
     radii = [radius * _MM for radius in face.radii]

@@ -1,4 +1,4 @@
-"""An entry from the form of a kit: trials with a real robot, judged by the thresholds of the scenario."""
+"""Make an entry from the form of a kit: trials with a real robot, judged by the thresholds of the scenario."""
 
 import hashlib
 import json
@@ -15,10 +15,10 @@ from apo_bench.io import CsvRow, read_bytes, read_csv
 from apo_bench.records import Criteria
 from apo_bench.scenario import load_scenario
 
-_HEX = 16
-_LARGEST_MM = 1000.0
+_HEX = 16  # digits of a hash
+_LARGEST_MM = 1000.0  # largest length in a form
 _ANSWERS = {"yes": True, "no": False}
-_MEASURED = ("fit_gap_mm", "support_gap_mm", "overlap_percent", "slid_mm")
+_MEASURED = ("fit_gap_mm", "support_gap_mm", "overlap_percent", "slid_mm")  # columns of measured lengths and overlaps
 
 
 @check_arguments
@@ -26,13 +26,13 @@ def read_real_entry(form: str | Path, method: str, name: str | None = None, comm
     """Read the trials of a method from a filled-in form.
 
     Args:
-        form: `form.csv` of a kit, of one scenario and one clearance.
-        method: Lines of other methods are left out.
-        name: In tables. Default: the method.
+        form: `form.csv` of a kit, with one scenario and one clearance.
+        method: The method; lines of other methods are left out.
+        name: The name in tables; default: the method.
         command: The command line, for the entry.
 
     Raises:
-        InputError: A cell is not what it should be, a trial is there twice, or the method has no line.
+        InputError: A cell is invalid, a trial occurs twice, or the method has no line.
     """
     check_name("entry", name or method)
     rows = list(read_csv(form, FORM_COLUMNS, [column for column in FORM_COLUMNS if column != "note"]))
@@ -53,9 +53,9 @@ def read_real_entry(form: str | Path, method: str, name: str | None = None, comm
 
 
 def judge_row(row: CsvRow, criteria: Criteria) -> str:
-    """Judge one line of a form as the judge does a simulated trial; its letter in an entry.
+    """Judge one line of a form as the judge does a simulated trial; return its letter in an entry.
 
-    What was measured may be empty where an operation did not end.
+    Measurements may be empty if the assembly did not end.
     """
     answers = {}
     for column in ("demonstration_right", "ended", "at_rest"):
@@ -79,7 +79,7 @@ def judge_row(row: CsvRow, criteria: Criteria) -> str:
 def _entry(
     scenario: str, criteria: Criteria, method: str, name: str, command: str, trials: str, form: str | Path
 ) -> Entry:
-    """An entry of one track, which is the scenario with its thresholds; it counts in no score over all."""
+    """Return an entry with one track: the scenario with its thresholds, which does not count in the overall score."""
     cells = {f"real|{scenario}|{criteria.clearance_mm:g} mm": trials}
     score, low, high = score_of(cells)
     counted = len(trials) - trials.count(EXCLUDED)

@@ -1,4 +1,4 @@
-"""Score a method over the trials of tracks."""
+"""Score a method over the trials of tracks, and return an entry."""
 
 import hashlib
 import json
@@ -21,7 +21,8 @@ from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.trials import trials_of
 
-_HEX = 16
+_HEX = 16  # digits of a hash
+# settings that identify a condition of an entry
 _SPELLED = tuple(name for name in CONDITION_FIELDS if name != "method")
 
 
@@ -41,16 +42,17 @@ def score(
 
     Args:
         method: As for `run_sweep`.
-        rows: The folder of the records, with a folder for each track and arm; continued if it holds records of the
-            same trials.
-        name: In tables. Default: the method.
-        quick: A few seeds of each condition, to check that it works.
+        rows: The folder of the records, with a folder for each track and arm; a folder with records of the same trials
+        is
+            continued.
+        name: The name in tables; default: the method.
+        quick: Run a few seeds of each condition, to check that the method works.
         command: The command line, for the entry.
         said: Called with each track before it runs.
         how: As for `run_sweep`: `workers`, `backend`, `secret_seed_file`.
 
     Raises:
-        InputError, RuntimeError, KeyboardInterrupt: As `run_sweep`; what had ended is kept.
+        InputError, RuntimeError, KeyboardInterrupt: As `run_sweep`; records of finished trials are kept.
     """
     name = name or method
     check_name("entry", name)
@@ -81,7 +83,7 @@ def score(
 
 
 def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str, Any]) -> TrackScore:
-    """The score of a track from the records on all of its arms."""
+    """Score a track from the records with all of its arms."""
     trials = trials_of(records)
     counted = trials.where(~np.isnan(trials.number("success")))
     conditions = _spell_conditions(records)
@@ -104,7 +106,7 @@ def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str,
 
 
 def _spell_conditions(records: Iterable[TrialRecord]) -> dict[str, str]:
-    """Settings of a condition -> its trials, one character each, the first seed first."""
+    """Return settings of a condition -> its trials, one letter each, by seed."""
     spelled = {True: RIGHT, False: WRONG, None: EXCLUDED}
     conditions = group_by(
         ("|".join([record["arm"], *(str(record.get(name)) for name in _SPELLED)]), record) for record in records

@@ -33,21 +33,21 @@ _HEX = 16
 @final
 @dataclass(frozen=True)
 class Track:
-    """Trials of one kind."""
+    """A fixed set of trials on which methods are scored."""
 
     name: str
     title: str
     overall: bool
-    """Whether it counts in the score over all tracks; the others are there for regression tests."""
-    quick_trials: int
+    """Whether it counts in the overall score; the others are for regression tests."""
+    quick_trials: int  # seeds per condition with --quick
     arms: tuple[str, ...]
     hash: str
-    """16 hexadecimal digits over the bytes of the file."""
+    """16 hexadecimal digits of a hash of the file."""
     grids: tuple[SweepConfig, ...]
-    """Their methods mean nothing."""
+    """The grids of the file; their methods are replaced by the one that is scored."""
 
     def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepConfig, ...]:
-        """The trials of a method on one of the arms."""
+        """Return the grids of a method on one of the arms."""
         own: dict[str, Any] = {"method": (method,), "arm": arm}
         return tuple(
             replace(grid, **own, trials=min(grid.trials, self.quick_trials) if quick else grid.trials)
@@ -56,7 +56,7 @@ class Track:
 
 
 class TrackTable(FileTable, frozen=True, kw_only=True):
-    """`[track]`."""
+    """The table `[track]` of a track file."""
 
     schema: Literal["apo-bench/track/1"]
     title: Text
@@ -67,13 +67,13 @@ class TrackTable(FileTable, frozen=True, kw_only=True):
 
 
 def seen_by(track: Track, estimator: str) -> Track:
-    """A track whose poses err as an estimator's do; it is another one, and counts in no score over all.
+    """Return a track whose poses have the errors of an estimator; it does not count in the overall score.
 
     Args:
-        estimator: A noise file, as `noise fit` writes it of estimates and ground truth.
+        estimator: A noise file, as `noise fit` writes it from estimates and ground truth.
 
     Raises:
-        InputError: No such file.
+        InputError: There is no such file.
     """
     content = read_bytes(estimator, "noise file (.toml)")
     own: dict[str, Any] = {"noise": (estimator,), "pose_source": (TrialConfig.pose_source,)}
@@ -87,16 +87,16 @@ def seen_by(track: Track, estimator: str) -> Track:
 
 
 def track_names() -> tuple[str, ...]:
-    """The tracks that come with the package, in the order of the alphabet."""
+    """Return the names of the tracks that come with the package, in alphabetical order."""
     return tuple(sorted(path.stem for path in (folder("scenarios") / "tracks").glob("*.toml")))
 
 
 @check_arguments
 def read_track(given: str | Path) -> Track:
-    """A track by name, or out of a file.
+    """Read a track by name, or from a file.
 
     Raises:
-        InputError: No such track, or anything in its file that is not as described.
+        InputError: There is no such track, or its file is invalid.
     """
     text = str(given)
     if not text.endswith(".toml"):
@@ -125,10 +125,10 @@ def read_track(given: str | Path) -> Track:
 
 @check_arguments
 def read_tracks(names: Sequence[str]) -> tuple[Track, ...]:
-    """Tracks by name or file; all that come with the package if none is named.
+    """Read tracks by name or file; without names, all that come with the package.
 
     Raises:
-        InputError: As `read_track`, or two have one name.
+        InputError: As `read_track`, or two tracks have the same name.
     """
     tracks = tuple(read_track(name) for name in names or track_names())
     called = [track.name for track in tracks]

@@ -1,1 +1,1 @@
-"""Sweeps: the trials of grids, the processes that run them, the folder of their records."""
+"""Sweeps: the trials of grids, the processes that run them, and the folder of their records."""

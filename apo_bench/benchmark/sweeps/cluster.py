@@ -1,6 +1,6 @@
-"""A Ray cluster whose nodes share the batches of a sweep.
+"""Run the batches of a sweep on a Ray cluster.
 
-Only the process that started the sweep writes records. A node that is lost has its batches run again elsewhere.
+Only the process that started the sweep writes records. Ray runs the batches of a lost node again on another one.
 """
 
 import importlib.util
@@ -25,28 +25,28 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import set_environment
 
 _TOUCH_S = 5.0
-"""What the port of a cluster gets to open."""
+"""Time limit to connect to the port of a cluster."""
 _AHEAD = 2
-"""So many tasks for each CPU are handed out: one runs, the others wait."""
+"""Number of tasks per CPU that are submitted: one runs, the others wait."""
 _OBJECT_STORE = 100 * 2**20
-"""Bytes, of a cluster that is started here; records are small."""
+"""Size in bytes of the object store of a cluster that is started here; records are small."""
 _SETTINGS = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_OVERRIDE_JOB_RUNTIME_ENV": "1",
 }
-"""Ray tells nobody that it runs, hides no GPU from the renderer, and takes our files instead of those of a job."""
+"""Ray sends no usage statistics, hides no GPU from the renderer, and uses our files instead of those of a job."""
 
 _POOLS = ExitStack()
-"""Of the worker processes of Ray: their own processes, which end with them."""
+"""In a worker process of Ray: its pool of one process, which ends with it."""
 
 
 def check_ray(address: str | None) -> None:
-    """Raise an `InputError` unless Ray is installed, and something listens at the address.
+    """Raise an `InputError` unless Ray is installed, and a server listens at the address.
 
     Args:
-        address: `HOST:PORT` of the head of a cluster, `auto` for the one that runs on this machine, `local` for one of
-            one's own; None for `auto` if there is one, else `local`.
+        address: `HOST:PORT` of the head of a cluster; `auto` for the one on this machine; `local` to start one for the
+            sweep. None means `auto` if there is one, else `local`.
     """
     require(
         importlib.util.find_spec("ray") is not None,
@@ -81,12 +81,14 @@ def run_on_cluster(
     """Run all batches on a Ray cluster.
 
     Args:
-        workers: At most so many at a time; None for as many as the cluster takes.
+        workers: Largest number of tasks at a time; None for as many as the cluster takes.
+        limit_s: Wall time limit of a trial.
+        emit: Called with each record and its timing.
         address: As in `check_ray`.
-        files: What every node needs in its current folder: path from there -> file.
+        files: Files that every node needs: path relative to its current folder -> file here.
 
     Raises:
-        InputError: No such cluster, or one whose nodes cannot work as this machine does.
+        InputError: There is no such cluster, or its nodes cannot run the same trials as this machine.
         RuntimeError: The cluster was lost, or a trial could not be run.
     """
     import ray
@@ -105,7 +107,7 @@ def run_on_cluster(
             for ended in ray.get(done[0]):
                 emit(*ended)
     except RayTaskError as error:
-        kind = InputError if isinstance(error.cause, InputError) else RuntimeError
+        kind = InputError if isinstance(error.cause, InputError) else RuntimeError  # the exception of the task itself
         raise kind(str(error.cause)) from error
     except RayError as error:
         raise RuntimeError(
@@ -117,7 +119,7 @@ def run_on_cluster(
 
 
 def run_on_node(batch: Batch, inputs: SweepInputs, limit_s: float) -> list[Ended]:
-    """The task of the cluster: run a batch in a process of the node, which may die of it."""
+    """Run a batch in a child process of a node, so that a crash does not end the worker process of Ray."""
     import ray
 
     node = {"node": ray.get_runtime_context().get_node_id()}
@@ -128,34 +130,37 @@ def run_on_node(batch: Batch, inputs: SweepInputs, limit_s: float) -> list[Ended
 
 @lru_cache(maxsize=1)
 def _pool_of_node() -> ProcessPool:
-    """The process that serves one CPU of a node; Ray gives the tasks of a sweep to the same few."""
+    """Return the pool of one process that serves a CPU of a node; Ray reuses its worker processes for later tasks."""
     return _POOLS.enter_context(process_pool(1))
 
 
 def _join(address: str | None, workers: int | None, files: Mapping[str, Path]) -> None:
-    """Join the cluster that was named, or that runs here, or one that is started for the time of the sweep.
+    """Join the named cluster, or the one on this machine, or one that is started for the duration of the sweep.
 
     Raises:
-        InputError: It cannot be joined.
+        InputError: The cluster cannot be joined.
     """
     import ray
     from ray.exceptions import RayError
 
-    handler = signal.getsignal(signal.SIGTERM)
+    handler = signal.getsignal(signal.SIGTERM)  # restored below
+    # settings of a cluster of our own
     alone = {"num_cpus": max(workers or 1, os.cpu_count() or 1), "object_store_memory": _OBJECT_STORE}
     with tempfile.TemporaryDirectory() as folder, set_environment(_SETTINGS):
         for name, path in files.items():
             (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, Path(folder) / name)
-        (Path(folder) / "made-for-a-sweep").touch()  # without a file in it, Ray takes the current folder
+        # Ray ignores an empty working folder and takes the current one
+        (Path(folder) / "made-for-a-sweep").touch()
         rendering = {name: os.environ[name] for name in ("MUJOCO_GL",) if name in os.environ}
         runtime = {"env_vars": dict.fromkeys(THREADS, "1") | rendering, "working_dir": folder}
         quiet: dict[str, Any] = {"runtime_env": runtime, "log_to_driver": False, "logging_level": "error"}
         try:
             ray.init(address=address or "auto", **quiet, **(alone if address == "local" else {}))
         except (ConnectionError, ValueError, RuntimeError, RayError) as error:
+            # a missing cluster is no error if none was named
             if address is not None or not isinstance(error, ConnectionError):
                 raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
             ray.init(address="local", include_dashboard=False, **quiet, **alone)
     with suppress(ValueError):
-        signal.signal(signal.SIGTERM, handler)  # Ray takes it, in the main thread
+        signal.signal(signal.SIGTERM, handler)  # Ray replaces it in the main thread

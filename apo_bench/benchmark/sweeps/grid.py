@@ -1,4 +1,4 @@
-"""The grids of a sweep: every combination of settings."""
+"""The grids of a sweep: every combination of settings, as batches of trials."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,22 +28,24 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, load_scenario
 
 MOST_TRIALS = 1_000_000
-"""Largest number of trials of one sweep: their settings are held in memory, half a kilobyte each."""
+"""Largest number of trials of one sweep, whose settings need half a kilobyte of memory each."""
 AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), NOISE_LEVEL) if info.axis)
-"""The settings of which a sweep may have several values."""
-_MAY_BE_EMPTY = ("clearance_mm", "noise")
+"""The settings that may have several values in a sweep."""
+_MAY_BE_EMPTY = ("clearance_mm", "noise")  # settings whose default depends on the scenario or the pose source
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """The settings that all trials of a sweep share."""
+# the scenario and its clearance are combined separately
 _VARIED = tuple(info for info in AXES if info.name not in ("scenario", "clearance_mm"))
 Batch = tuple[TrialConfig, ...]
-"""Trials that share layout and demonstration."""
+"""Trials that share layout and demonstration, and run in one process."""
 
 
 _FIRST = ("scenario", "noise_level", "human_error_scale", "method")
-"""The settings that may be given by position."""
+"""The settings that may be positional arguments."""
 
 
 def _axis_fields() -> Iterator[tuple[str, Any, Any]]:
+    """Yield name, type and field of each setting that a sweep may vary, then of each that its trials share."""
     for info in sorted(AXES, key=lambda info: _FIRST.index(info.name) if info.name in _FIRST else len(_FIRST)):
         default = () if info.name in _MAY_BE_EMPTY else info.swept or (info.default,)
         yield info.name, tuple[Any, ...], field(default=default, kw_only=info.name not in _FIRST)
@@ -52,7 +54,7 @@ def _axis_fields() -> Iterator[tuple[str, Any, Any]]:
 
 
 _Axes: Any = make_dataclass("_Axes", _axis_fields(), frozen=True)
-"""One field for each setting that a sweep may vary, and for each that its trials share."""
+"""Base class with one field for each setting that a sweep may vary, and for each that its trials share."""
 
 
 @final
@@ -74,20 +76,21 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     scenario: tuple[str, ...]
     """Names, or paths of scenario files."""
     clearance_mm: tuple[float, ...] = field(default=(), kw_only=True)
-    """Default: the clearance of each scenario."""
+    """Clearances per side; empty: that of each scenario."""
     noise: tuple[str, ...] = field(default=(), kw_only=True)
-    """Default: `isotropic`; none with the pose source `depth-camera` alone."""
+    """Noise models; empty: `isotropic`, or none if `depth-camera` is the only pose source."""
     noise_mm: tuple[float, ...] = field(default=(), kw_only=True)
     """In place of `noise_level`: standard deviations of positions."""
     noise_deg: tuple[float, ...] = field(default=(), kw_only=True)
     """In place of `noise_level`: standard deviations of rotation vectors."""
     trials: int = field(default=100, kw_only=True)
-    """Trials of each combination."""
+    """Number of trials of each combination."""
     seed: int = field(default=0, kw_only=True)
-    """The first of the seeds."""
+    """The first seed; the others follow."""
 
     def __post_init__(self) -> None:
         if self.noise_mm != () or self.noise_deg != ():
+            # one of the two may be missing
             by_axis = [as_tuple(values) or (1.0,) for values in (self.noise_mm, self.noise_deg)]
             object.__setattr__(self, "noise_level", tuple(product(*by_axis)))
             object.__setattr__(self, "noise_mm", ())
@@ -101,7 +104,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
                 f"no {info.words} was given for the sweep; at least one is needed.",
             )
             object.__setattr__(self, info.name, values)
-            for value in () if info is NOISE_LEVEL else values:
+            for value in () if info is NOISE_LEVEL else values:  # pairs are checked below
                 info.check(value)
         for name in SHARED:
             check(name, getattr(self, name))
@@ -116,6 +119,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
             refuse_noise(*self.noise)
         else:
             object.__setattr__(self, "noise", self.noise or (TrialConfig.noise,))
+        # each noise level must fit each pose source
         for level, source in product(self.noise_level, self.pose_source):
             parse_noise_level(level, source)
         check_together(self.fidelity, *self.grasp)
@@ -123,13 +127,13 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
 
 
 def as_tuple(values: Any) -> tuple[Any, ...]:
-    """One value or several as a tuple: a text is one name, a list in a list a pair."""
+    """Return one value or several as a tuple: a text is one value, and a list within a list becomes a pair."""
     several = values if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
     return tuple(tuple(each) if isinstance(each, list) else each for each in several)
 
 
 def _plain(value: Any) -> Any:
-    """Numbers as records have them, whatever their type: 2.0 for 2, and 0.0 for -0.0."""
+    """Convert numbers to floats as in records: 2.0 for 2, and 0.0 for -0.0; other values stay."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value) + 0.0
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -138,7 +142,10 @@ def _plain(value: Any) -> Any:
 
 
 def check_grids(grids: Sequence[SweepConfig]) -> None:
-    """Raise an `InputError` unless there is a grid, all share arm, time step and fidelity, and memory can hold them."""
+    """Raise an `InputError` unless the grids can be one sweep.
+
+    There must be a grid, all must share arm, time step and fidelity, and there may not be too many trials.
+    """
     require(grids, "no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
@@ -152,7 +159,7 @@ def check_grids(grids: Sequence[SweepConfig]) -> None:
 
 
 def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
-    """Every scenario of a sweep, name or path -> scenario.
+    """Load every scenario of a sweep; returns name or path -> scenario.
 
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
@@ -174,17 +181,19 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
 def units(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None = None
 ) -> Iterator[Batch]:
-    """All trials of a sweep, each once, ordered by seed, so that an interrupted sweep has about as many of each
-    condition; the trials of one batch share layout and demonstration.
+    """Yield all trials of a sweep, each once, in batches ordered by seed.
 
-    Noise and human error do not affect the oracle: it runs once per seed, grasp and robot error, recorded with noise
-    level 0, human error scale 0 and the first noise model or pose source. Other settings that do not affect a method
-    are recorded for it as their defaults.
+    By this order an interrupted sweep has about equally many trials of each condition.
+
+    Noise and human error do not affect the oracle. So it runs once per seed, grasp and robot error, with noise level 0,
+    human error scale 0 and the first noise model or pose source in its record. For other methods, settings without
+    effect have their defaults.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
-        those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
+        those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]  # grids that have this seed
         for source, scenario in loaded.items():
             same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
+            # layout and demonstration depend on the keys of this grouping
             together = group_by(
                 ((trial.clearance_mm, trial.human_error_scale, trial.pose_source), trial)
                 for grid in those
@@ -192,11 +201,12 @@ def units(
                 for clearance_mm in grid.clearance_mm or (scenario.clearance_mm,)
                 for trial in _trials(grid, same | {"clearance_mm": clearance_mm})
             )
+            # without trials that several grids share
             yield from (tuple(dict.fromkeys(trials)) for trials in together.values())
 
 
 def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
-    """The grids as `run.json` has them, with scenarios by name and clearances filled in."""
+    """Return the grids for `run.json`, with scenarios by name and clearances filled in."""
     forms = []
     for grid in grids:
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
@@ -207,14 +217,18 @@ def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario])
 
 
 def _trials(grid: SweepConfig, same: Mapping[str, Any]) -> Iterator[TrialConfig]:
-    """Every combination of a grid, with defaults in place of settings that do not affect the method."""
+    """Yield every combination of a grid; settings that do not affect the method have their defaults.
+
+    Args:
+        same: Settings that all of these trials share.
+    """
     shared = {name: getattr(grid, name) for name in SHARED}
     names = [info.name for info in _VARIED]
     for combination in product(*(getattr(grid, name) or (DEPTH_CAMERA,) for name in names)):
         values = dict(zip(names, combination, strict=True))
         method = values["method"]
         values |= {name: SETTINGS[name].default for name in names if not affects(name, method)}
-        if knows_truth(method):
+        if knows_truth(method):  # noise and human error do not affect it
             first = {"pose_source": grid.pose_source[0], "noise": (*grid.noise, DEPTH_CAMERA)[0]}
             values |= {"noise_level": 0.0, "human_error_scale": 0.0, **first}
         if values["pose_source"] == DEPTH_CAMERA:

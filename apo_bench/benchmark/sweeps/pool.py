@@ -1,7 +1,7 @@
-"""Local processes that share the batches of a sweep.
+"""Run the batches of a sweep in processes on this machine.
 
-A batch whose process dies, or that takes longer than a trial may, runs again trial by trial: so the one that is to
-blame has the failed record.
+If a process dies or exceeds its time limit, its batch runs again trial by trial. So only the trial that caused it gets
+a failed record.
 """
 
 import math
@@ -29,20 +29,20 @@ from apo_bench.trial.endings import record_lost_trial
 from apo_bench.trial.request import Request, checked_request, record_lost_request, run_request
 
 Emit = Callable[[TrialRecord, Timing], None]
-"""Takes the record of a trial that has ended; every trial of a sweep yields exactly one."""
+"""Takes the record and timing of a finished trial; called exactly once for each trial of a sweep."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Workers have one thread per linear algebra library: the processes already fill the cores."""
+"""Variables that limit the threads of linear algebra libraries to one, since the processes already use all cores."""
 _MOST_BATCHES = 200
-"""After so many a process is replaced, which gives its memory back."""
+"""Number of batches after which a process is replaced, to release its memory."""
 _AHEAD = 2
-"""So many batches for each process are handed out: one is done, the others wait."""
+"""Number of batches per process that are submitted: one runs, the others wait."""
 _LONGEST_TRIAL_S = 1e6
 _WORKERS: list[Worker] = []
-"""In a process of a pool: its worker, once it has one."""
+"""In a process of a pool: a list with its worker, empty before its first batch."""
 
 
 def check_limit(limit_s: float) -> None:
-    """Raise an `InputError` unless a trial can have such a limit."""
+    """Raise an `InputError` unless this is a valid time limit of a trial."""
     require(
         math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_TRIAL_S,
         f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {_LONGEST_TRIAL_S:g} is allowed.",
@@ -51,8 +51,8 @@ def check_limit(limit_s: float) -> None:
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPool]:
-    """New interpreters that have imported what trials need; they are ended with the context."""
-    spawn: Any = multiprocessing.get_context("spawn")
+    """Start processes that have imported what trials need; they are stopped at the end of the context."""
+    spawn: Any = multiprocessing.get_context("spawn")  # forked processes would share state
     pool = ProcessPool(workers, _MOST_BATCHES, prepare_process, [folder_of_own_modules()], spawn)
     with set_environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
         try:
@@ -72,7 +72,7 @@ def run_locally(batches: Sequence[Batch], inputs: SweepInputs, workers: int, lim
     """Run all batches in processes on this machine.
 
     Raises:
-        InputError: A worker found that the request cannot be honoured.
+        InputError: A worker found that the settings or files do not allow a trial.
         RuntimeError: A trial could not be run, or processes end before they have begun one.
     """
     with process_pool(min(workers, len(batches))) as pool:
@@ -82,7 +82,7 @@ def run_locally(batches: Sequence[Batch], inputs: SweepInputs, workers: int, lim
 def run_in_pool(
     pool: ProcessPool, batches: Sequence[Batch], inputs: SweepInputs, workers: int, limit_s: float, emit: Emit
 ) -> None:
-    """Run all batches in processes that are there already, as `run_locally` does."""
+    """Run all batches in an existing pool, as `run_locally` does."""
     waiting = deque(batches)
     running: dict[Future[list[Ended]], Batch] = {}
     while waiting or running:
@@ -90,11 +90,11 @@ def run_in_pool(
             batch = waiting.popleft()
             running[pool.schedule(_run_batch, [batch, inputs], timeout=limit_s)] = batch
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            waiting.extendleft(_take(future, running.pop(future), inputs, emit))
+            waiting.extendleft(_take(future, running.pop(future), inputs, emit))  # trials of a failed batch come first
 
 
 def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: Emit) -> list[Batch]:
-    """Emit what came of a batch, and return the batches to be run in its place."""
+    """Emit the results of a batch, and return the batches that replace it if its process died or was too slow."""
     try:
         for record, wall in future.result():
             emit(record, wall)
@@ -109,12 +109,12 @@ def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: 
 
 
 def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
-    """What `run_request` does, in a process of its own that may take so much wall time.
+    """Run a request as `run_request` does, but in a process of its own with a wall time limit.
 
     Raises:
-        InputError: A setting that is not allowed, or two that contradict each other.
+        InputError: A setting is not allowed, or two settings contradict each other.
         RuntimeError: The trial could not be run.
-        KeyboardInterrupt: A signal asked for an end.
+        KeyboardInterrupt: A signal ended the program.
     """
     scenario, settings = checked_request(request)
     check_limit(limit_s)
@@ -127,22 +127,22 @@ def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
 
 
 def prepare_process(folder: str) -> None:
-    """The first that a process of a pool does: what is printed there, by whatever code, goes to standard error.
+    """Prepare a process of a pool: redirect everything that is printed to standard error, and find user modules.
 
     Args:
-        folder: Of modules that are named as `module:name`; empty for none.
+        folder: Folder of modules that are named as `module:name`; empty for none.
     """
-    os.dup2(2, 1)
+    os.dup2(2, 1)  # also what libraries print below Python
     sys.stdout = sys.stderr
-    os.environ.pop(SAFE_PATH)
+    os.environ.pop(SAFE_PATH)  # needed only while the process starts
     add_own_modules(folder)
 
 
 def _start(pool: ProcessPool) -> None:
-    """Start the processes of a pool, deaf to Ctrl-C: it is for this process, which ends them."""
+    """Start the processes of a pool with SIGINT blocked, since the parent process handles Ctrl-C and ends them."""
     if hasattr(signal, "pthread_sigmask"):
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        assert pool.active
+        assert pool.active  # starts the processes, which inherit the blocked signal
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -151,7 +151,7 @@ def _code_of(error: Exception) -> str:
 
 
 def _run_batch(batch: Batch, inputs: SweepInputs) -> list[Ended]:
-    """In a process of a pool: what comes of a batch."""
+    """Run a batch; called in a process of a pool, which keeps its worker for later batches."""
     if not _WORKERS:
         _WORKERS.append(Worker(inputs, {"worker": os.getpid()}))
     return list(_WORKERS[0].run(batch))

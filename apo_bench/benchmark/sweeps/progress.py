@@ -1,4 +1,4 @@
-"""The progress of a sweep on the terminal."""
+"""Show the progress of a sweep on the terminal, or as lines in a log."""
 
 import sys
 import time
@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from apo_bench.io import format_count
 
 Count = Callable[[], None]
-"""Called for every trial that has ended."""
+"""Called for every finished trial."""
 EVERY_S = 60.0
-"""Between two lines where there is no terminal."""
+"""Seconds between two lines if there is no terminal."""
 
 
 @contextmanager
 def progress(total: int) -> Iterator[Count]:
-    """Show how many of `total` trials have ended, and how long the rest will take."""
+    """Show how many of `total` trials are finished, and how long the others will take."""
     if not sys.stderr.isatty() or total == 0:
         yield _lines(total)
         return
@@ -29,7 +29,7 @@ def progress(total: int) -> Iterator[Count]:
 
 
 def _lines(total: int) -> Count:
-    """Says how many trials there are; then every minute how many have ended, and when the rest will at this pace."""
+    """Return a counter that prints a line at the start, then every minute the progress and the remaining time."""
     if total:
         sys.stderr.write(f"0 of {total} trials\n")
         sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""Signals that end a program raise an exception, as Ctrl-C does."""
+"""Convert signals that end a program into exceptions, as Ctrl-C is."""
 
 import signal
 import threading
@@ -8,14 +8,15 @@ from types import FrameType
 from typing import Any, final
 
 Check = Callable[[], None]
-"""Raises `Stopped` once a signal came."""
+"""Raises `Stopped` if a signal has arrived."""
+# where there is no SIGHUP, SIGTERM stands twice
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
-_USUAL = (signal.SIG_DFL, signal.default_int_handler)
+_USUAL = (signal.SIG_DFL, signal.default_int_handler)  # handlers that may be replaced
 
 
 @final
 class Stopped(KeyboardInterrupt):
-    """A signal asked this process to stop."""
+    """A signal asked this process to stop; `number` is that of the signal."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -24,10 +25,10 @@ class Stopped(KeyboardInterrupt):
 
 @contextmanager
 def stop_at_signals(patience: int = 0) -> Iterator[Check]:
-    """Raise `Stopped` at signals, wherever the program is; signals that the caller handles or ignores stay as they are.
+    """Raise `Stopped` when a signal arrives; signals that the caller handles or ignores are left alone.
 
     Args:
-        patience: Signals that are only noted; the yielded function raises `Stopped` once there is one.
+        patience: Number of signals that raise nothing at once; the yielded function raises `Stopped` after any of them.
     """
     came: list[int] = []
 
@@ -40,6 +41,7 @@ def stop_at_signals(patience: int = 0) -> Iterator[Check]:
         if came:
             raise Stopped(came[0])
 
+    # only the main thread may set handlers
     signals = _SIGNALS if threading.current_thread() is threading.main_thread() else ()
     before: dict[int, Any] = {number: found for number in signals if (found := signal.getsignal(number)) in _USUAL}
     for number in before:
@@ -47,7 +49,8 @@ def stop_at_signals(patience: int = 0) -> Iterator[Check]:
     try:
         yield check
     except KeyboardInterrupt as error:
-        raise Stopped(came[0] if came else signal.SIGINT) from error  # Ray raises a plain one
+        # Ray raises a plain KeyboardInterrupt
+        raise Stopped(came[0] if came else signal.SIGINT) from error
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

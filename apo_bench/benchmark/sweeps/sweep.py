@@ -1,4 +1,4 @@
-"""Run sweeps, and resume interrupted ones."""
+"""Run sweeps, and continue interrupted ones."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ from apo_bench.trial.inputs import content_pieces, noise_content, own_content
 _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
 BATCH = 8
-"""Trials that a worker does at a time, at most: some seconds."""
+"""Most trials in a batch, which takes a worker some seconds."""
 
 
 @check_arguments
@@ -58,14 +58,14 @@ def run_sweep(
     The records depend on neither the number of workers, nor where they run, nor the order in which trials end.
 
     Args:
-        grids: One, or several whose trials are united.
+        grids: One grid, or several whose trials are united.
         out: The folder of the records; made if it does not exist, continued if it holds records of the same sweep.
         workers: Processes; they are spawned, so a script that calls this needs the usual
             `if __name__ == "__main__":`. None: with `local` this process, without a limit for trials; with `ray` all
             workers of the cluster.
         limit_s: Wall time of a trial in a worker; one that takes longer gets a failed record.
         backend: `local`, or `ray` for a cluster.
-        address: Of a running cluster.
+        address: Address of a running cluster, as in `check_ray`.
         command: The command line, for `run.json`.
         secret_seed_file: File of the secret seed, made if it does not exist; None for trials that anyone can draw.
 
@@ -73,9 +73,9 @@ def run_sweep(
         All records of the folder, in the order in which they were written.
 
     Raises:
-        InputError: A setting that is not allowed, or a folder with trials of another sweep.
+        InputError: A setting is not allowed, or the folder has trials of another sweep.
         RuntimeError: A trial could not be run, or a record could not be written.
-        KeyboardInterrupt: After Ctrl-C or a signal; the records of the batches that had ended are written.
+        KeyboardInterrupt: After Ctrl-C or a signal; records of finished batches are kept.
 
     Examples:
         >>> import apo_bench, tempfile
@@ -93,16 +93,16 @@ def run_sweep(
     grids = (grids,) if isinstance(grids, SweepConfig) else tuple(grids)
     _check_executor(workers, limit_s, backend, address)
     check_grids(grids)
-    # everything that has a name is found before a folder is made or a process started
+    # check every name and file before a folder is made or a process is started
     loaded = load_all(grids)
     _check_names(grids)
-    physics(grids[0].timestep_s)
+    physics(grids[0].timestep_s)  # raises if the time step is not allowed
     arm_name = grids[0].arm
     arm = find_arm(arm_name)
     content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
     inputs = SweepInputs(content, versions())
     secret_seed = None if secret_seed_file is None else open_secret_seed(secret_seed_file, out)
-    here = workers is None and backend == "local"
+    here = workers is None and backend == "local"  # in this process
     run = run_record(
         describe_grids(grids, loaded),
         _content(grids, loaded, arm.files),
@@ -141,13 +141,17 @@ def run_sweep(
 def _left(
     work: Iterable[Batch], loaded: Mapping[str, Scenario], inputs: SweepInputs, store: RunFolder
 ) -> Iterator[Batch]:
-    """Batches of the trials without a record; existing records must be those that the trials would give."""
+    """Yield batches of the trials without a record.
+
+    Raises:
+        InputError: An existing record was made with other files, versions or settings.
+    """
     hashes: dict[TrialConfig, str] = {}
     for unit in work:
         left = []
         for trial in unit:
             found = store.finished.get(make_trial_key(trial, loaded[trial.scenario].name))
-            cell = replace(trial, method=CORRECTOR, seed=0)
+            cell = replace(trial, method=CORRECTOR, seed=0)  # the hash depends on neither
             if found is None:
                 left.append(trial)
             elif cell not in hashes:
@@ -162,6 +166,7 @@ def _left(
 
 
 def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
+    """Raise an `InputError` unless these workers and this backend can run a sweep."""
     require(
         workers is None or 1 <= workers <= _LARGEST_WORKERS,
         f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.",
@@ -181,6 +186,7 @@ def _check_executor(workers: int | None, limit_s: float, backend: str, address: 
 def _check_names(grids: Sequence[SweepConfig]) -> None:
     """Raise an `InputError` unless noise models, contact sources and correctors can be imported here."""
     for grid in grids:
+        # a model must allow the highest level
         highest = max(max(parse_noise_level(noise_level)) for noise_level in grid.noise_level)
         for noise in grid.noise:
             make_noise(noise, NoiseLevel(highest, highest))
@@ -194,14 +200,14 @@ def _check_names(grids: Sequence[SweepConfig]) -> None:
 
 
 def _names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:
-    """What all grids name on an axis, each once."""
+    """Return the values of all grids for a setting, each once."""
     return tuple(dict.fromkeys(name for grid in grids for name in getattr(grid, axis)))
 
 
 def _content(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], arm_files: tuple[Path, ...]
 ) -> dict[str, str]:
-    """What the trials are made of besides the package, piece by piece, so that a change can be named."""
+    """Return input -> hash for each file and plugin of the trials, so that a message can name what changed."""
     pieces = {
         f"{scenario.name}, {piece}": hashed
         for source, scenario in loaded.items()

@@ -1,15 +1,15 @@
-"""Sweep files: grids of settings as TOML.
+"""Read sweep files: grids of settings as TOML.
 
     scenario = ["stick_in_tower", "carried_bridge"]
     noise_level = [0.5, 1, 2]
     method = ["uncorrected", "paper", "contact"]
     trials = 40
 
-    [[also]]                  # a further grid: keys that it does not have are as above
+    [[also]]                  # a further grid; keys that it lacks are as above
     method = ["oracle"]
     noise_level = [0]
 
-Lengths in mm, angles in degrees; paths as on the command line, from the current folder.
+Lengths are in mm, angles in degrees. Paths are relative to the current folder, as on the command line.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,11 +28,11 @@ from apo_bench.records import SETTINGS, convert_to_python_units
 _SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
 """Keys that take one value or several."""
 _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
-"""One for the whole sweep: they stand at the top of the file only."""
+"""Key -> setting that the whole sweep shares; these keys stand at the top of the file only."""
 SWEEP_KEYS = (*_SEVERAL, "trials", "seed")
-_VALUES = [(key, Any, UNSET) for key in SWEEP_KEYS]
+_VALUES = [(key, Any, UNSET) for key in SWEEP_KEYS]  # every key is optional
 AlsoTable = msgspec.defstruct("AlsoTable", _VALUES, bases=(FileTable,), kw_only=True)
-"""`[[also]]`: a further grid."""
+"""The table `[[also]]`: a further grid."""
 SweepTable = msgspec.defstruct(
     "SweepTable",
     [
@@ -43,14 +43,14 @@ SweepTable = msgspec.defstruct(
     bases=(FileTable,),
     kw_only=True,
 )
-"""A whole file."""
+"""The whole file."""
 
 
 def is_sweep_file(text: str) -> bool:
-    """Whether what was given in place of scenarios is a sweep file: TOML that is no scenario file.
+    """Return whether an argument is a sweep file: a TOML file that is no scenario file.
 
     Raises:
-        InputError: It is TOML that cannot be read.
+        InputError: It is a TOML file that cannot be read.
     """
     if not text.lower().endswith(".toml"):
         return False
@@ -62,26 +62,26 @@ def is_sweep_file(text: str) -> bool:
 def read_sweep(
     path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
 ) -> tuple[SweepConfig, ...]:
-    """The grids of a sweep file: the top one, and one for each `[[also]]`.
+    """Read the grids of a sweep file: the top one, and one for each `[[also]]`.
 
     Args:
-        overrides: Key of the file -> what to take instead, in every grid.
-        besides: Keys of the file that are read elsewhere.
+        overrides: Key -> value that replaces the one of the file in every grid.
+        besides: Keys of the file that the caller reads itself.
 
     Raises:
-        InputError: Anything in the file that is not as described.
+        InputError: The file is invalid.
     """
     keys = {key: value for key, value in read_plain(path, "sweep file").items() if key not in besides}
     top: Any = convert_typed(keys, SweepTable, str(path))
     first = _values(top)
     grids = {str(path): first}
     for i, table in enumerate(top.also, start=1):
-        grids[f"{path}, also {i}"] = first | _values(table)
+        grids[f"{path}, also {i}"] = first | _values(table)  # missing keys are those of the first grid
     return tuple(_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
 
 
 def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
-    """The grid of some values, which it checks itself."""
+    """Make a grid from its values; errors name the place in the file."""
     try:
         return SweepConfig(**convert_to_python_units(values))
     except InputError as error:
@@ -89,6 +89,6 @@ def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
 
 
 def _values(table: msgspec.Struct) -> dict[str, Any]:
-    """The values of the keys that a table has."""
+    """Return the keys that a table states, with their values."""
     stated = {key: value for key, value in msgspec.structs.asdict(table).items() if value is not UNSET}
     return {key: as_tuple(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"}

@@ -1,4 +1,4 @@
-"""The user's own files that every node of a cluster needs."""
+"""Find the user's own files that every node of a cluster needs."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -13,13 +13,14 @@ from apo_bench.trial.inputs import own_files
 def travelling_files(
     loaded: Mapping[str, Scenario], arm_files: Iterable[Path], names: Iterable[str]
 ) -> dict[str, Path]:
-    """Files below the current folder: path from there -> file. What lies elsewhere does not travel.
+    """Return the needed files below the current folder: relative path -> file. Files elsewhere are not copied.
 
-    Scenario files and the files of their parts, the arm, noise files, and the modules of what is given as
-    `module:name` with what they import from the same place.
+    The files are those of scenarios, their parts, the arm and noise models, and modules named as `module:name`, with
+    the modules that they import from the same folder.
 
     Args:
-        loaded: Every scenario by what was given for it.
+        loaded: Name or path of a scenario -> scenario.
+        arm_files: Files of the arm.
         names: Methods, noise models, contact sources and the arm.
     """
     files = [*arm_files]

@@ -16,14 +16,14 @@ from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
 
 Timing = dict[str, Any]
-"""One line of `timing.jsonl`: what no specification determines."""
-Ended = tuple[TrialRecord, Timing]
+"""A line of `timing.jsonl`: wall times, host and worker, which settings and seed do not determine."""
+Ended = tuple[TrialRecord, Timing]  # record and timing of a finished trial
 
 
 @final
 @dataclass(frozen=True)
 class SweepInputs:
-    """Inputs of all records of a sweep, from the process that started it."""
+    """Hashes and versions that the records of a sweep state, as found by the process that started it."""
 
     content: Mapping[str, str]
     """Name or path of a scenario -> its `content_hash`."""
@@ -33,14 +33,17 @@ class SweepInputs:
 
 @final
 class Worker:
-    """Runs batches; compiles each scene once."""
+    """Runs batches of trials; compiles each scene once."""
 
     def __init__(self, inputs: SweepInputs, name: Mapping[str, Any]) -> None:
-        """Args:
-            name: Tells workers apart in `timing.jsonl`.
+        """Check the installed packages.
+
+        Args:
+            inputs: Hashes and versions that must also be found here.
+            name: Columns of `timing.jsonl` that identify the worker.
 
         Raises:
-            InputError: Packages of other versions are installed here.
+            InputError: Other versions of packages are installed here.
         """
         here = versions()
         for package, version in inputs.versions.items():
@@ -51,15 +54,15 @@ class Worker:
             )
         self._inputs = inputs
         self._name = name
-        self._scenes: dict[tuple[Any, ...], Scene] = {}
+        self._scenes: dict[tuple[Any, ...], Scene] = {}  # key of a scene -> compiled scene
 
     def run(self, batch: Batch) -> Iterator[Ended]:
-        """Run the trials of a batch in their order; the demonstration and the beginnings of replays are shared.
+        """Run the trials of a batch in order; they share the demonstration and the common beginnings of replays.
 
         Raises:
-            InputError: The request cannot be honoured, or there are other files here than where the sweep was started.
+            InputError: A trial is not allowed, or files differ from those of the process that started the sweep.
         """
-        cache = ReplayCache()
+        cache = ReplayCache()  # states of replays, for later ones that begin alike
         simulated = None
         for spec in batch:
             start = time.perf_counter()
@@ -72,6 +75,7 @@ class Worker:
             yield record, timing(record, compiled - start, shown - compiled, ended - shown, self._name)
 
     def _scene(self, spec: TrialConfig) -> Scene:
+        """Return the compiled scene of a trial; its files must be those of the process that started the sweep."""
         key = scene_key(spec)
         if key not in self._scenes:
             scene = scene_of(spec)
@@ -92,7 +96,10 @@ def timing(
     trial_s: float | None,
     worker: Mapping[str, Any],
 ) -> Timing:
-    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
+    """Return the line of `timing.jsonl` for a trial.
+
+    Compilation and demonstration are counted for the first trial that needs them; None is unknown.
+    """
     return {
         **dict(zip(KEY, get_record_key(record), strict=True)),
         "compile_s": compile_s,

@@ -1,4 +1,4 @@
-"""Options, help pages, checks of output files and printing that commands share."""
+"""Options, help pages, checks of output files and printing that several commands share."""
 
 from apo_bench.cli.shared.arguments import (
     NO_RESULT,

@@ -13,12 +13,12 @@ NO_RESULT = 1
 
 
 def make_path_option(description: str, *names: str) -> Any:
-    """An option that takes the path of a file or a folder."""
+    """Return an option that takes the path of a file or a folder."""
     return typer.Option(*names, parser=parse_path, metavar="PATH", help=description)
 
 
 def make_path_argument(name: str, description: str) -> Any:
-    """An argument that takes the path of a file or a folder."""
+    """Return an argument that takes the path of a file or a folder."""
     return typer.Argument(parser=parse_path, metavar=name, help=description)
 
 

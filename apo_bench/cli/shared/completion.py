@@ -1,6 +1,6 @@
-"""Completion of names when Tab is pressed in a shell.
+"""Complete names when Tab is pressed in a shell.
 
-Where no name begins like the typed text, a shell offers files, as scenarios, noise models and arms may be files.
+If no name begins with the typed text, a shell offers files, since scenarios, noise models and arms may be files.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ Completion = Callable[[str], list[str]]
 
 
 def offered_names(setting: str) -> list[str]:
-    """Names that come with the package for a setting or a `scenario`, and prefixes of others."""
+    """Return the names that the package has for a setting or a `scenario`, and prefixes such as `menagerie:`."""
     if setting == "scenario":
         return _stems("scenarios", "*.toml")
     if setting == "noise":
@@ -28,7 +28,7 @@ def offered_names(setting: str) -> list[str]:
 
 
 def complete_last_word(setting: str) -> Completion:
-    """Offer names that begin like the text after the last comma."""
+    """Return a completion of the text after the last comma, without names that precede it."""
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")

@@ -1,4 +1,4 @@
-"""The layout of `--help`: groups of commands and options, then examples."""
+"""Lay out help pages: groups of commands and options, then examples."""
 
 import signal
 from collections.abc import Mapping
@@ -34,10 +34,10 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Heading -> options of `apo-bench run` and `sweep`, in this order."""
 OTHERS = "Other options"
-"""Heading of the options that have no other."""
-_RESUMED = ("sweep", "score")
-_WHOLE = 10_000  # letters of a sentence that are shown: all
-_KILLED = 128  # plus the number of a signal: the exit code of a process that it ended
+"""Heading of the options without a heading of their own."""
+_RESUMED = ("sweep", "score")  # commands that continue after an interruption
+_WHOLE = 10_000  # letters of a sentence that are shown: all of them
+_KILLED = 128  # a process ended by a signal has this exit code plus the number of the signal
 
 
 class Interruption(Exception):
@@ -55,7 +55,7 @@ class Interruption(Exception):
 
 
 class _WithExamples:
-    """Writes the lines below `Examples:` of the help text at the end, each on its line."""
+    """Prints the lines below `Examples:` of a help text at the end of the page."""
 
     help: str | None
 
@@ -70,10 +70,10 @@ class _WithExamples:
 
 
 class Command(_WithExamples, TyperCommand):
-    """A command; one of many options lists them under the headings of `OPTIONS`."""
+    """A command; those with many options list them under the headings of `OPTIONS`."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; a signal ends it with a sentence."""
+        """Run the command; a signal raises `Interruption`."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
@@ -81,7 +81,7 @@ class Command(_WithExamples, TyperCommand):
             raise Interruption(error, kept * (self.name in _RESUMED)) from error
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write a list for each heading that has an option here."""
+        """Write a list of options for each heading that has any."""
         if self.name not in ("run", "sweep"):
             return super().format_options(ctx, formatter)
         records = {p.opts[0]: record for p in self.get_params(ctx) if (record := p.get_help_record(ctx)) is not None}
@@ -89,6 +89,7 @@ class Command(_WithExamples, TyperCommand):
             heading: [records.pop(name) for name in names if name in records] for heading, names in OPTIONS.items()
         }
         arguments = [records.pop(name) for name in list(records) if not name.startswith("-")]
+        # left over: options without a heading
         for heading, listed in ({"Arguments": arguments} | lists | {OTHERS: list(records.values())}).items():
             if listed:
                 with formatter.section(heading):
@@ -97,14 +98,14 @@ class Command(_WithExamples, TyperCommand):
 
 
 class Group(_WithExamples, TyperGroup):
-    """The commands of `apo-bench` under the headings of `GROUPS`; those of a group in one list."""
+    """A group of commands; those of `apo-bench` itself are listed under the headings of `GROUPS`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Show the help page where no command is named."""
+        """Show the help page if no command is named."""
         return super().parse_args(ctx, args or ["--help"])
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write a list for each heading that has a command here."""
+        """Write a list of commands for each heading."""
         sentences = {name: command.get_short_help_str(_WHOLE) for name, command in self.commands.items()}
         widest = max(map(len, sentences))
         groups = GROUPS if ctx.parent is None else {"Commands": tuple(sentences)}
@@ -114,5 +115,5 @@ class Group(_WithExamples, TyperGroup):
 
 
 def make_group(name: str, description: str) -> typer.Typer:
-    """Commands below one name."""
+    """Return a group of commands below one name."""
     return typer.Typer(name=name, cls=Group, rich_markup_mode=None, help=description)

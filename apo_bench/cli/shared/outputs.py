@@ -1,4 +1,4 @@
-"""Checks of files that a command writes, before it does any work."""
+"""Check the files that a command is to write, before it does any work."""
 
 import os
 from collections.abc import Iterator
@@ -12,15 +12,16 @@ from apo_bench.io import check_target
 def check_output(
     path: Path | None, option: str, *endings: str, inputs: tuple[Path, ...] = (), new: bool = False
 ) -> None:
-    """Refuse a file that cannot be written, or that the command also reads; None is no file.
+    """Check a file that the command is to write; None is no file.
 
     Args:
-        endings: Allowed ends of its name, such as `.png`.
-        inputs: Files that the command reads.
-        new: Refuse a file that exists.
+        option: Name of the option, for the message.
+        endings: Allowed endings of the file name, such as `.png`.
+        inputs: Files that the command reads, which it may not overwrite.
+        new: Whether the file must not exist.
 
     Raises:
-        InputError: The file is refused.
+        InputError: The file cannot be written, or must not be.
     """
     if path is None:
         return
@@ -39,7 +40,7 @@ def check_output(
 
 @contextmanager
 def name_write_errors(target: str = "") -> Iterator[None]:
-    """Turn an operating system error into one about `--out FILE`, or about the file that failed."""
+    """Turn an `OSError` into an `InputError` about the target, such as `--out FILE`, or about the file that failed."""
     try:
         yield
     except OSError as error:

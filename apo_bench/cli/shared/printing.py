@@ -1,4 +1,4 @@
-"""Printing of JSON, texts and tables."""
+"""Print JSON, texts and tables."""
 
 import json
 import sys
@@ -17,19 +17,19 @@ def print_json(form: Any) -> None:
 
 
 def say(text: str, as_json: bool) -> None:
-    """Print a text for people, unless a JSON object is all that is printed."""
+    """Print a text for people, unless the command prints a JSON object only."""
     if not as_json:
         typer.echo(text)
 
 
 def print_written(*paths: Path | None, as_json: bool = False) -> None:
-    """Name the files that were written, unless a JSON object is all that is printed."""
+    """Print the names of written files, unless the command prints a JSON object only."""
     if any(paths):
         say("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None), as_json)
 
 
 def print_columns(lines: Iterable[Sequence[str]]) -> None:
-    """Print cells below each other; on a terminal they are wrapped within their column."""
+    """Print rows of cells in aligned columns; on a terminal, cells are wrapped within their column."""
     from rich.table import Table
 
     cleaned = [[clean(cell) for cell in cells] for cells in lines]
@@ -43,13 +43,13 @@ def print_columns(lines: Iterable[Sequence[str]]) -> None:
 
 
 def print_table(table: Any, narrowest: int = 110) -> None:
-    """Print a table of `rich` after an empty line."""
+    """Print a table of `rich` after an empty line, at least `narrowest` characters wide."""
     typer.echo()
     make_console(narrowest).print(table)
 
 
 def make_console(narrowest: int = 80) -> Any:
-    """A console as wide as the terminal; where there is none, wide enough to keep lines whole."""
+    """Return a console as wide as the terminal, at least `narrowest`; without a terminal at least 160 characters."""
     from rich.console import Console
 
     least = narrowest if sys.stdout.isatty() else 160

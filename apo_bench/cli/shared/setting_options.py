@@ -1,4 +1,4 @@
-"""Options for the settings of a trial, made from the description of each setting."""
+"""Make command-line options for the settings of a trial from the description of each setting."""
 
 from collections.abc import Callable, Iterable
 from inspect import Parameter, signature
@@ -17,12 +17,13 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def add_options(options: Iterable[Parameter]) -> Callable[[Command], Command]:
-    """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**options`."""
+    """Return a decorator that adds options to a command, which gets them as `**options`."""
 
     def wrap(command: Command) -> Command:
         own = signature(command, eval_str=True)
         parameters = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
         plain = [p for p in parameters if p.kind is not Parameter.KEYWORD_ONLY]
+        # between plain and keyword-only ones
         vars(command)["__signature__"] = own.replace(parameters=[*plain, *options, *parameters[len(plain) :]])
         return command
 
@@ -30,13 +31,14 @@ def add_options(options: Iterable[Parameter]) -> Callable[[Command], Command]:
 
 
 def make_trial_options(*names: str) -> list[Parameter]:
-    """Options of one trial for these settings, or for all; each may be left out."""
+    """Return the options of one trial for these settings, or for all; each option may be omitted."""
     infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
     return [_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
 
 
 def make_sweep_options() -> list[Parameter]:
-    """Options of a sweep: its axes, and the settings that all of its trials share."""
+    """Return the options of a sweep: its axes, and the settings that all of its trials share."""
+    # settings that may have several values
     axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
     shared = [info for info in SETTINGS.values() if info.shared]
     return [
@@ -46,13 +48,13 @@ def make_sweep_options() -> list[Parameter]:
 
 
 def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
-    """The values of an axis: `0,0.5,1` or `uncorrected,contact`."""
+    """Parse the values of an axis: `0,0.5,1` or `uncorrected,contact`."""
     kind = str if info.is_text else int if info.is_whole else float
     return parse_list(text, f"--{info.option}", kind)
 
 
 def format_default(info: SettingInfo) -> str:
-    """The default of a setting, in the unit of its option."""
+    """Return the default of a setting as text, in the unit of its option."""
     return info.usual or _in_option_unit(info, info.default)
 
 

@@ -1,4 +1,4 @@
-"""Text of the command line as numbers, names and paths."""
+"""Parse numbers, names and paths of the command line."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +9,12 @@ import typer
 from apo_bench.errors import InputError
 
 _Value = TypeVar("_Value")
+# type -> description of a list of its values
 _FORMS: dict[object, str] = {float: "numbers such as 0,0.5,1", int: "whole numbers such as 0,2,4", str: "names"}
 
 
 def parse_list(text: str, option: str, kind: Callable[[str], _Value]) -> tuple[_Value, ...]:
-    """`0,0.5,1` as values of `float`, `int` or `str`."""
+    """Parse a list such as `0,0.5,1` into values of `float`, `int` or `str`."""
     entries = text.split(",")
     try:
         if all(map(str.strip, entries)):
@@ -24,7 +25,7 @@ def parse_list(text: str, option: str, kind: Callable[[str], _Value]) -> tuple[_
 
 
 def parse_path(text: str | Path) -> Path:
-    """A path that names something: the empty text would stand for the current folder."""
+    """Return a path; raise an error for an empty text, which would stand for the current folder."""
     if not str(text).strip():
         raise typer.BadParameter("the path is empty; name a file or a folder.")
     return Path(text)

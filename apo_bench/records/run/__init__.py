@@ -1,1 +1,1 @@
-"""The folder of a sweep."""
+"""The folder of a sweep: records, timings and description of the run."""

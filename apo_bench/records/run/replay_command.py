@@ -1,4 +1,4 @@
-"""The command that runs the trial of a record again."""
+"""The command line that runs the trial of a record again."""
 
 import shlex
 from collections.abc import Mapping
@@ -8,22 +8,26 @@ from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.settings import DEPTH_CAMERA, NOISE_LEVEL, SETTINGS
 
 _SALT_FILE = "FILE"
-"""Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
+"""Placeholder for the file of the secret seed, whose path a page must not reveal."""
 _ALWAYS = ("clearance_mm", "method")
-"""Said even if it is as usual."""
+"""Settings that a command states even if they have their default."""
 _APART = ("scenario", "noise_mm", "noise_deg", "seed", "secret_seed")
-"""Said in a way of its own."""
+"""Settings that a command states in another form."""
 Files = Mapping[str, str]
-"""Scenarios that were given as files: name -> path."""
+"""Name -> path of each scenario that was given as a file."""
 
 
 def replay_command(
     record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS, *, measured: bool = False
 ) -> str:
-    """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance.
+    """Return `apo-bench run SCENARIO .. --seed N`, quoted for a shell.
+
+    Of the defaults, only method and clearance are stated.
 
     Args:
-        measured: Whether the observation comes from a file: settings of a random draw are left out.
+        files: Scenarios that were given as files.
+        limits: Limits of the sweep, which are stated for a trial that was lost.
+        measured: Whether the observation comes from a file, so that settings of a random draw are left out.
     """
     if measured:
         drawn = {name: info.default for name, info in SETTINGS.items() if info.drawn or name == "noise"}
@@ -32,13 +36,14 @@ def replay_command(
 
 
 def without_seed(record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
-    """A replay command without its seed: what the trials of a cell have in common."""
+    """Return a replay command without its seed, which all trials of a condition share."""
     scenario = str((files or {}).get(record["scenario"], record["scenario"]))
-    scenario = f"./{scenario}" if scenario.startswith("-") else scenario
+    scenario = f"./{scenario}" if scenario.startswith("-") else scenario  # not an option
     return shlex.join(["apo-bench", "run", scenario, *_options(record, limits)])
 
 
 def _options(record: Mapping[str, Any], limits: Limits) -> list[str]:
+    """Return the options of the settings of a record, other than scenario and seed."""
     words: list[str] = []
 
     def add(option: str, value: object, default: object = None) -> None:
@@ -64,11 +69,11 @@ def _options(record: Mapping[str, Any], limits: Limits) -> list[str]:
 
 
 def number(x: float) -> str:
-    """The shortest text that is read as the same number."""
+    """Return the shortest text that is read back as the same number."""
     return str(int(x)) if x == int(x) and abs(x) < 1e15 else repr(x)
 
 
 def milli(seconds: float) -> float:
-    """In thousandths, such that these times 1e-3 are the same number again wherever there are such."""
+    """Convert to thousandths, such that the result times 1e-3 is the same number again, if there is such a number."""
     rounded = float(f"{seconds * 1e3:.12g}")
     return rounded if rounded * 1e-3 == seconds else seconds * 1e3

@@ -1,4 +1,4 @@
-"""`run.json`: the settings of a sweep and the inputs of its records."""
+"""Read and write `run.json`: the settings of a sweep, and the inputs of its records."""
 
 import json
 import os
@@ -27,14 +27,14 @@ def run_record(
     limits: Limits = USUAL_LIMITS,
     revision: str = "",
 ) -> dict[str, Any]:
-    """The content of `run.json`.
+    """Return the content of `run.json`.
 
     Args:
-        grids: From `described`.
+        grids: The grids, of `describe_grids`.
         content: Input of the trials -> its hash.
-        files: Scenarios that were given as files: name -> path.
-        versions: Package -> version, of those that may show in a record.
-        revision: Git revision of the package; it is noted and not compared.
+        versions: Package -> version, for packages that may affect a record.
+        files: Name -> path of each scenario that was given as a file.
+        revision: Git revision of the package, for information only; it is not compared.
     """
     return {
         "schema": _RUN,
@@ -52,34 +52,37 @@ def run_record(
 
 
 def write_run(folder: Path, run: Mapping[str, Any]) -> None:
-    """Replace the file at once: it is the old one or the new one, never half of it."""
+    """Replace `run.json` at once, so that a reader finds the old or the new content, never a part."""
     write_file(folder / "run.json", json.dumps(run, indent=2) + "\n")
 
 
 def read_run(folder: Path) -> dict[str, Any]:
-    """What `run.json` says; nothing if it is not there.
+    """Read `run.json`; returns an empty dictionary if there is none.
 
     Raises:
-        InputError: It cannot be read, or is something else; one sentence with file and field.
+        InputError: The file cannot be read, or is invalid; the message names file and field.
     """
     path = folder / "run.json"
     return run_of(read_bytes(path, "run file", _LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
 
 
 def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
-    """Scenarios that were given as files: name -> path."""
+    """Return name -> path of each scenario that was given as a file."""
     return dict(run.get("files") or {})
 
 
 def limits_of(run: Mapping[str, Any]) -> Limits:
-    """The limits that a sweep had when it was last started; the usual ones where it does not say."""
+    """Return the limits that a sweep had when it was last started; the usual ones if `run.json` states none."""
     limits = {"trial_s": USUAL_LIMITS.trial_s} | (run.get("limits") or {})
     trial_s = limits["trial_s"]
     return Limits(None if trial_s is None else float(trial_s))
 
 
 def check_same(folder: Path, run: Mapping[str, Any]) -> None:
-    """Raise an `InputError` that says what differs, unless a folder is of the same sweep; it may have fewer trials."""
+    """Raise an `InputError` that names the difference, unless a folder is of the same sweep.
+
+    The folder may have fewer trials per combination than the sweep now has.
+    """
     try:
         before = read_run(folder)
     except InputError as error:
@@ -89,7 +92,7 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     require(
         schema == _RUN, f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder."
     )
-    now = json.loads(json.dumps(run))
+    now = json.loads(json.dumps(run))  # as it will be read back
     grids = before.get("grids", [])
     count = f"it had {len(grids)} grids, now {len(now['grids'])}" if len(grids) != len(now["grids"]) else ""
     differences = [
@@ -102,10 +105,10 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
 
 
 def _difference(before: Any, now: Mapping[str, Any], *, may_grow: bool = False) -> str:
-    """The first key with another value, and both values; empty if there is none.
+    """Return the first key with another value, and both values, as text; empty if there is none.
 
     Args:
-        may_grow: More `trials` are no difference.
+        may_grow: Whether a larger number of `trials` counts as equal.
     """
     before = before if isinstance(before, dict) else {}
     for key in sorted({*before, *now}):

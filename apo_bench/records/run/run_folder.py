@@ -1,9 +1,9 @@
-"""The folder of a sweep, to which records are appended.
+"""Write and read the folder of a sweep, to which records are appended.
 
 trials.jsonl   one record per trial: only what settings and seed determine
 timing.jsonl   one line per trial: wall times, host, worker; missing lines do not matter
 run.json       grids, inputs, versions, command line, git revision
-torn.txt       half lines of an interrupted sweep, if any
+torn.txt       incomplete lines of an interrupted sweep, if any
 """
 
 import json
@@ -20,18 +20,18 @@ from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import record_of, unwritable
 from apo_bench.records.secret_seed import check_same_secret_seed
 
-CHUNK = 1 << 16
+CHUNK = 1 << 16  # bytes that are read at a time
 
 
 @final
 class RunFolder:
-    """Append records to the folder of a sweep and keep other writers out; a context manager."""
+    """Context manager that appends records to the folder of a sweep, and keeps other writers out."""
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
         """Open a folder, which is made if it does not exist.
 
         Raises:
-            InputError: The folder cannot be written, is being written, or holds trials of another sweep.
+            InputError: The folder cannot be written, another process writes to it, or it holds trials of another sweep.
         """
         self.folder = folder
         self.finished: dict[Key, str] = {}
@@ -50,7 +50,7 @@ class RunFolder:
                     check_same(folder, run)
                 write_run(folder, run)
                 self._timing = opened.enter_context(open_to_append(folder / "timing.jsonl"))
-                self._files = opened.pop_all()
+                self._files = opened.pop_all()  # closed by __exit__
         except OSError as error:
             raise InputError(
                 f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
@@ -63,11 +63,11 @@ class RunFolder:
         self._files.close()
 
     def append(self, record: Mapping[str, Any], timing: Mapping[str, Any]) -> None:
-        """Add a trial that has ended, each line in one write.
+        """Append record and timing of a finished trial.
 
         Raises:
-            RuntimeError: The record does not fit the table of fields, or cannot be written, as on a full disk; then
-                the half line is removed.
+            RuntimeError: The record is invalid, or cannot be written, as on a full disk; no part of it stays in the
+            file.
         """
         kept = f"the {len(self.finished)} before it are kept"
         wrong = unwritable(record)
@@ -81,21 +81,21 @@ class RunFolder:
                 "same command continues once there is room."
             ) from error
         self.finished[get_record_key(record)] = record["config_hash"]
-        with suppress(OSError):
+        with suppress(OSError):  # a missing timing does not matter
             _append(self._timing.fileno(), timing)
 
 
 def read_records(folder: str | Path) -> list[TrialRecord]:
-    """The records of a sweep, in the order in which the trials ended, without a torn last line.
+    """Read the records of a sweep, in the order in which the trials ended, without an incomplete last line.
 
     Raises:
-        InputError: No such folder, no trials in it, or a line that is not a record.
+        InputError: There is no such folder, it holds no trials, or a line is no record.
     """
     return list(each_record(folder))
 
 
 def each_record(folder: str | Path) -> Iterator[TrialRecord]:
-    """The records of a folder one after the other, so that a reader need not hold them all."""
+    """Yield the records of a folder one by one, so that a reader need not hold all of them."""
     path = Path(folder) / "trials.jsonl"
     require(
         path.exists(),
@@ -105,11 +105,11 @@ def each_record(folder: str | Path) -> Iterator[TrialRecord]:
 
 
 def _lock(file: int, folder: Path) -> None:
-    """Keep other writers out until the file is closed or the process ends."""
+    """Lock a file against other writers until it is closed or the process ends."""
     try:
         import fcntl
     except ImportError:
-        return
+        return  # Windows has no flock
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -117,16 +117,16 @@ def _lock(file: int, folder: Path) -> None:
             f"another sweep is writing to '{folder}'; wait until it has ended, or choose another folder."
         ) from error
     except OSError:
-        return
+        return  # some network file systems cannot lock
 
 
 def _append(file: int, line: Mapping[str, Any]) -> None:
-    """Add a whole line, or nothing."""
+    """Append a line; if that fails, remove the part that was written."""
     left = json.dumps(line, allow_nan=False).encode() + b"\n"
     before = os.fstat(file).st_size
     try:
         while left:
-            left = left[os.write(file, left) :]
+            left = left[os.write(file, left) :]  # os.write may write a part only
     except OSError:
         with suppress(OSError):
             os.ftruncate(file, before)
@@ -134,7 +134,7 @@ def _append(file: int, line: Mapping[str, Any]) -> None:
 
 
 def _set_torn_line_aside(path: Path) -> None:
-    """Move what follows the last end of a line, which is no record, into another file."""
+    """Move an incomplete last line of an interrupted sweep to the file `torn.txt`."""
     check_target(path)
     if not path.exists():
         return
@@ -142,7 +142,7 @@ def _set_torn_line_aside(path: Path) -> None:
         end = file.seek(0, os.SEEK_END)
         at = end
         tail = b""
-        while at > 0 and b"\n" not in tail:
+        while at > 0 and b"\n" not in tail:  # read backwards until the last end of a line
             at = max(0, at - CHUNK)
             file.seek(at)
             tail = file.read(end - at)

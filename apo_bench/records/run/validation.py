@@ -1,4 +1,4 @@
-"""Read and check the files in the folder of a sweep."""
+"""Decode and check the files of a sweep's folder: records, timings and `run.json`."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -31,7 +31,7 @@ RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
         "revision": _Text,
     }
 )
-"""Keys of `run.json`; all may be missing."""
+"""Key of `run.json` -> type of its value; all keys are optional."""
 _Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
 TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
     {
@@ -41,12 +41,12 @@ TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
         "worker": int | Name,
     }
 )
-"""Keys of a line of `timing.jsonl`."""
+"""Key of a line of `timing.jsonl` -> type of its value."""
 _NAMES = (
     *("scenario", "noise", "contact_source", "grasp", "arm", "method", "config_hash", "pose_source"),
     *("robot_error", "ft_sensor", "assumed_robot_error"),
 )
-"""Texts of a record that stand in commands, so nothing in them may control a terminal."""
+"""Texts of a record that appear in commands, so they must not contain control characters."""
 _TOGETHER = (
     ("noise_mm", "noise_deg", "human_error_scale"),
     ("success", "loose_success"),
@@ -57,10 +57,11 @@ _TOGETHER = (
     ("consistent", "suspects"),
     ("probe_contacts", "probe_contacts_rejected", "base_error_estimate_mm", "base_error_estimate_deg"),
 )
-"""Columns that are null together."""
+"""Columns that are all null, or all not null."""
 
 
 def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), **more: Any) -> type[msgspec.Struct]:
+    """Return a msgspec type with these fields; those that are not required may be null or missing."""
     columns: list[Any] = [
         (field, kind) if field in required else (field, kind | None, None) for field, kind in fields.items()
     ]
@@ -70,17 +71,18 @@ def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), 
 _RECORD = msgspec.json.Decoder(_struct("TrialRecord", RECORD_FIELDS, REQUIRED))
 _TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
 _RUN = msgspec.json.Decoder(_struct("Run", RUN_FIELDS))
+# for writing, where unknown columns are an error
 _WRITTEN = _struct("Written", RECORD_FIELDS, REQUIRED, forbid_unknown_fields=True)
 
 
 def record_of(line: bytes, where: str) -> TrialRecord:
-    """The record in a line, with every column, null where the line has none.
+    """Decode and check a line of `trials.jsonl`; return the record with every column, null where the line has none.
 
     Args:
-        where: File and line, for the error.
+        where: File and line, for the message.
 
     Raises:
-        InputError: The line is not a record.
+        InputError: The line is no record.
     """
     record = _decode(_RECORD, line, where)
     require(
@@ -94,19 +96,19 @@ def record_of(line: bytes, where: str) -> TrialRecord:
 
 
 def timing_of(line: bytes, where: str) -> dict[str, Any]:
-    """The wall times in a line of `timing.jsonl`.
+    """Decode and check a line of `timing.jsonl`.
 
     Raises:
-        InputError: The line does not hold them.
+        InputError: The line holds no wall times of a trial.
     """
     return _decode(_TIMING, line, where)
 
 
 def run_of(text: bytes, file: str) -> dict[str, Any]:
-    """The keys of `run.json` that have a value.
+    """Decode and check `run.json`; return the keys that have a value.
 
     Raises:
-        InputError: It is not such a document.
+        InputError: The text is no such document.
     """
     run = _decode(_RUN, text, file)
     for name, path in (run["files"] or {}).items():
@@ -115,7 +117,7 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
 
 
 def unwritable(record: Mapping[str, Any]) -> str:
-    """Why a record may not be written, since it could not be read again; empty if it may."""
+    """Return why a record may not be written, since reading it would fail; empty if it may."""
     try:
         msgspec.convert(dict(record), _WRITTEN)
         msgspec.json.encode(record)
@@ -125,6 +127,7 @@ def unwritable(record: Mapping[str, Any]) -> str:
 
 
 def _decode(decoder: Any, text: bytes, where: str) -> dict[str, Any]:
+    """Decode a text into a dictionary; errors name the place `where`."""
     try:
         return msgspec.structs.asdict(decoder.decode(text))
     except (msgspec.DecodeError, RecursionError, ValueError) as error:
@@ -132,7 +135,7 @@ def _decode(decoder: Any, text: bytes, where: str) -> dict[str, Any]:
 
 
 def _contradiction(record: Mapping[str, Any]) -> str:
-    """Columns that do not go together, in words; empty if all do."""
+    """Return a sentence on columns that contradict each other; empty if there are none."""
     for name in _NAMES:
         if record.get(name) and CONTROL.search(record[name]):
             return f"field {name}: control characters are not allowed"

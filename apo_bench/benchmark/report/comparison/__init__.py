@@ -1,1 +1,1 @@
-"""The comparison of two sweeps."""
+"""The comparison of two sweeps, trial by trial."""

@@ -1,4 +1,4 @@
-"""Compare two sweeps trial by trial."""
+"""Compare two sweeps trial by trial: verdicts, numbers, settings and rates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
 from apo_bench.records.run.trials import Mask, Trials, read_trials
 
-_ENDING = ("success", "failure_stage", "failure_code")
-_RESULT = (
+_ENDING = ("success", "failure_stage", "failure_code")  # columns that must agree for the same ending
+_RESULT = (  # columns that must agree for identical trials
     *(*_ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "corrected_operations"),
     *NUMBERS,
 )
@@ -36,7 +36,7 @@ class Side(NamedTuple):
     """One of the two sweeps."""
 
     folder: Path
-    run: Mapping[str, Any]
+    run: Mapping[str, Any]  # content of `run.json`; empty if unreadable
     trials: Trials
 
 
@@ -48,35 +48,38 @@ class Comparison:
     first: Side
     second: Side
     differences: Sequence[Line]
-    """What differs between the runs, and its value in each; None where a run has none."""
+    """Settings and versions that differ between the runs, with both values; None where a run has none."""
     shared: int
-    """Trials of both."""
+    """Number of trials in both sweeps."""
     alone: tuple[int, int]
-    """Trials of the first alone, and of the second alone."""
+    """Number of trials in the first sweep only, and in the second only."""
     agreements: Sequence[Line]
-    """By scenario, and of all at the end, without trials whose demonstration was right in neither. A trial draws all
-    random numbers from its seed, the same in every scenario, so seeds, and not trials, are independent:
-    `same_verdicts_in_all` counts those at which every trial has the same verdict in both."""
+    """Lines by scenario, and one over all at the end, without trials whose demonstration failed in both sweeps.
+
+    All trials of a seed share their random numbers, so only seeds are independent. `same_verdicts_in_all` counts the
+    seeds whose trials all have the same verdict in both sweeps.
+    """
     changed: Sequence[Line]
-    """The trials whose verdicts differ, with how each ended."""
+    """The trials whose verdicts differ, with both endings."""
     numbers: Sequence[Line]
-    """In how many trials both have a number, in how many it differs and by how much at most, and in how many one alone
-    has it."""
+    """For each number of a record: trials with it in both, how many differ, the largest difference, trials with it in
+    one sweep only."""
     identical: int
     """Trials with exactly the same verdict, stage, code, sentence and numbers."""
     conditions: Sequence[Line]
-    """Rates of both in each condition, whatever the fidelity; None where one has no trial."""
+    """Rates of both sweeps in each condition, whatever the fidelity; None where a sweep has no trial."""
 
 
 def compare(first: str | Path, second: str | Path) -> Comparison:
     """Compare the sweeps of two folders.
 
-    Trials are the same if all settings of their key agree: scenario, noise, method, seed and others. Fidelity, arm and
-    time step do not belong to it, so that they can be compared.
+    Trials are paired if all settings of their key agree: scenario, noise, method, seed and others. Fidelity, arm and
+    time step are no part of the key, so sweeps that differ in these can be compared.
 
     Raises:
-        InputError: A folder is no sweep or holds a trial twice, or both share no trial (with other secret seeds a seed
-            is another trial).
+        InputError: A folder is no sweep or holds a trial twice, or the sweeps share no trial. With different secret
+        seeds,
+            equal seeds are different trials.
     """
     a, b = (Side(Path(folder), read_run(Path(folder)), read_trials(folder)) for folder in (first, second))
     for side in (a, b):
@@ -91,7 +94,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     theirs = _number_by_key(b)
     both = [key for key in ours if key in theirs]
     require(both, f"'{first}' and '{second}' have no trial in common; compare sweeps of the same settings and seeds.")
-    x = a.trials.where(np.array([ours[key] for key in both]))
+    x = a.trials.where(np.array([ours[key] for key in both]))  # the shared trials of both, in the same order
     y = b.trials.where(np.array([theirs[key] for key in both]))
     return Comparison(
         first=a,
@@ -108,7 +111,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
 
 
 def _differences(first: Side, second: Side) -> list[Line]:
-    """Settings and versions that differ; without a `run.json` of both, only those of the records."""
+    """Return settings and versions that differ; if a `run.json` is missing, only those of the records."""
     if not (first.run and second.run):
         first, second = (s._replace(run={"run.json can be read": bool(s.run) or None}) for s in (first, second))
     ours = _settings_of(first)
@@ -118,7 +121,7 @@ def _differences(first: Side, second: Side) -> list[Line]:
 
 
 def _settings_of(side: Side) -> dict[str, Any]:
-    """Settings by name: of `run.json` one level deep, and of the records."""
+    """Return settings by name: from `run.json`, with its tables flattened by one level, and from the records."""
     tables = {f"grid {i}": grid for i, grid in enumerate(side.run.get("grids", ()), start=1)}
     tables |= {name: value for name, value in side.run.items() if isinstance(value, dict)}
     settings = {f"{name}: {key}": value for name, table in tables.items() for key, value in table.items()}
@@ -128,7 +131,11 @@ def _settings_of(side: Side) -> dict[str, Any]:
 
 
 def _number_by_key(side: Side) -> dict[Key, int]:
-    """Key -> number of the trial."""
+    """Return key -> index of each trial, without observations from files.
+
+    Raises:
+        InputError: A trial occurs twice.
+    """
     index: dict[Key, int] = {}
     for i, key in enumerate(zip(*(side.trials.values(name) for name in KEY), strict=True)):
         require(
@@ -142,13 +149,14 @@ def _number_by_key(side: Side) -> dict[Key, int]:
 
 
 def _same(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
-    """(n,) whether all these columns are exactly the same."""
+    """Return a mask, (n,), of the trials whose values agree exactly in all these columns."""
     ours, theirs = (zip(*(trials.values(name) for name in names), strict=True) for trials in (a, b))
     return np.array([x == y for x, y in zip(ours, theirs, strict=True)], dtype=bool)
 
 
 def _agreements(a: Trials, b: Trials) -> list[Line]:
-    """Per scenario, and over all."""
+    """Return lines on the agreement per scenario, and one over all scenarios at the end."""
+    # the demonstration succeeded in at least one sweep
     counts = ~(np.isnan(a.number("success")) & np.isnan(b.number("success")))
     masks = {name: counts & a.holds("scenario", (name,).__contains__) for name in sorted(a.distinct("scenario"))}
     masks[ALL] = counts
@@ -158,7 +166,7 @@ def _agreements(a: Trials, b: Trials) -> list[Line]:
 def _agreement(scenario: str, a: Trials, b: Trials) -> Line:
     same = _same(a, b, ("success",))
     seeds, of = np.unique(a.number("seed"), return_inverse=True)
-    alike = np.bincount(of, ~same, minlength=len(seeds)) == 0
+    alike = np.bincount(of, ~same, minlength=len(seeds)) == 0  # seeds without any differing verdict
     return {
         "scenario": scenario,
         "trials": len(same),
@@ -172,14 +180,18 @@ def _agreement(scenario: str, a: Trials, b: Trials) -> Line:
 
 
 def _share(name: str, successes: int, trials: int) -> Line:
-    """A count with its rate and Wilson's interval."""
+    """Return columns with a count, its rate, and Wilson's interval."""
     rate = Rate(successes, trials)
     low, high = rate.interval
     return {name: successes, f"{name}_rate": rate.rate, f"{name}_low_95": low, f"{name}_high_95": high}
 
 
 def _verdicts(x: Array, y: Array) -> Line:
-    """Of the trials that both count, the difference of success, second minus first, with Tango's interval."""
+    """Return counts of trials that succeed in one sweep only, and the difference of success, second minus first.
+
+    Args:
+        x, y: Success in the first and second sweep, (n,): 1, 0, or NaN if the demonstration failed.
+    """
     shared = int((~np.isnan(x) & ~np.isnan(y)).sum())
     first = int(((x == 1) & (y == 0)).sum())
     second = int(((x == 0) & (y == 1)).sum())
@@ -195,7 +207,7 @@ def _verdicts(x: Array, y: Array) -> Line:
 
 
 def _changed(first: Side, second: Side) -> list[Line]:
-    """Sorted as conditions are, then by seed."""
+    """Return the trials whose verdicts differ, sorted by condition, then by seed."""
     unlike = ~_same(first.trials, second.trials, ("success",))
     pairs = zip(first.trials.where(unlike).rows(), second.trials.where(unlike).rows(), strict=True)
     lines = [
@@ -207,7 +219,7 @@ def _changed(first: Side, second: Side) -> list[Line]:
 
 
 def _ending(record: Mapping[str, Any], side: Side) -> Line:
-    """How a trial ended on a side, and how to run it again."""
+    """Return how a trial ended in one sweep, and the command to run it again."""
     return {
         "verdict": verdict(record),
         "why": why(record),
@@ -219,12 +231,12 @@ def _ending(record: Mapping[str, Any], side: Side) -> Line:
 
 
 def _number_changes(a: Trials, b: Trials) -> list[Line]:
-    """One line for each number that is in any record."""
+    """Return a line for each number that occurs in a record: in how many trials it differs, and by how much at most."""
     lines = []
     for name in NUMBERS:
         x = a.number(name)
         y = b.number(name)
-        apart = np.abs(x - y)[~np.isnan(x - y)]
+        apart = np.abs(x - y)[~np.isnan(x - y)]  # NaN where only one has the number
         alone = int((np.isnan(x) != np.isnan(y)).sum())
         differ = int((apart > 0).sum())
         most = float(apart.max(initial=0.0))
@@ -233,8 +245,14 @@ def _number_changes(a: Trials, b: Trials) -> list[Line]:
 
 
 def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Line]:
-    """Conditions of both, whatever the fidelity; sorted as `tally` sorts."""
+    """Return the rates in each condition, sorted as `tally` sorts, whatever the fidelity.
+
+    Args:
+        first, second: All trials of each sweep.
+        a, b: The shared trials, in the same order.
+    """
     ours, theirs = ({_at_any_fidelity(c.condition): c for c in tally(trials)} for trials in (first, second))
+    # condition -> indices of its shared trials
     of: dict[Condition, list[int]] = {condition: [] for condition in sorted({**ours, **theirs}, key=make_sort_key)}
     for i, record in enumerate(a.rows()):
         condition = get_condition(record)

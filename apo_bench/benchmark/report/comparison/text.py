@@ -1,4 +1,4 @@
-"""A comparison as tables, page and JSON object."""
+"""A comparison of two sweeps as tables, as an HTML page, and as a JSON object."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -26,9 +26,10 @@ _CONDITIONS = (
     "Rates over all trials of each side; alone and the difference, second minus first, over the trials that they share."
 )
 _MOST_LISTED = 2000
-"""Changed trials that are listed."""
+"""Most changed trials that are listed."""
+# template of a difference with its interval
 _DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
-_WHERE = (
+_WHERE = (  # columns that identify a condition
     TableColumn("scenario", "scenario", "condition.scenario", words=True),
     TableColumn("conditions", "conditions", "condition.description", words=True),
     TableColumn("method", "method", "condition.method", words=True),
@@ -37,7 +38,7 @@ _WHERE = (
 
 
 def comparison_tables(comparison: Comparison) -> dict[str, Table]:
-    """By the name of their file: agreements, numbers, conditions, changed trials, differences of the runs."""
+    """Return the tables by the name of their file: agreement, numbers, conditions, changed, differences."""
     agreement = (
         TableColumn("scenario", "scenario", words=True),
         TableColumn("trials", "trials"),
@@ -95,7 +96,7 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
 
 
 def in_words(comparison: Comparison) -> str:
-    """The whole in some sentences, counts first."""
+    """Summarise a comparison in some sentences, counts first."""
     first, second = comparison.alone
     shared = f"{_trials(comparison.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
     identical = f"{_trials(comparison.identical)} the same to the last digit."
@@ -103,7 +104,7 @@ def in_words(comparison: Comparison) -> str:
 
 
 def _agreed(total: Line) -> str:
-    """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
+    """Return how many verdicts agree, and at how many seeds all verdicts agree; only seeds are independent."""
     if not total["trials"]:
         return "None of them counts: no demonstration was right itself."
     counted = f", {total['excluded_in_one']:,} counted in one of the two alone" * bool(total["excluded_in_one"])
@@ -121,7 +122,7 @@ def _agreed(total: Line) -> str:
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> Path:
-    """Write the page and its tables (CSV and Parquet); returns the page.
+    """Write the page and its tables (CSV and Parquet); return the path of the page.
 
     Raises:
         InputError: The folder cannot be written.
@@ -151,7 +152,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
 
 
 def comparison_form(comparison: Comparison) -> dict[str, Any]:
-    """A comparison as JSON holds it."""
+    """Return a comparison as a JSON object."""
     return {
         "schema": "apo-bench/comparison/1",
         "first": str(comparison.first.folder),
@@ -169,11 +170,12 @@ def comparison_form(comparison: Comparison) -> dict[str, Any]:
 
 
 def _between(name: str) -> str:
-    """A template of both ends of an interval."""
+    """Return a template for an interval, from its lower to its upper end."""
     return f"{{{name}_low_95:hundredths}} to {{{name}_high_95:hundredths}} %"
 
 
 def _label(line: Line) -> str:
+    # the head of the number's column
     return NUMBERS[line["name"]]
 
 
@@ -182,5 +184,5 @@ def _trials(n: int) -> str:
 
 
 def _side(name: str) -> Callable[[Line], str]:
-    """What a side says of something that is not the same in both."""
+    """Return a function that formats the value of a setting in one sweep, `first` or `second`."""
     return lambda line: "not said" if line[name] is None else value_words(line[name])

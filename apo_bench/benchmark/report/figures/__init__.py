@@ -1,1 +1,1 @@
-"""The figures of a sweep."""
+"""The figures of a report."""

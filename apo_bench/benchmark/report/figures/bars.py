@@ -1,4 +1,4 @@
-"""Bar figures: endings of trials, and predictions against outcomes."""
+"""Draw bar figures: outcomes of trials, and predictions against outcomes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,17 +7,20 @@ from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw
 from apo_bench.benchmark.report.figures.style import COLORS, SOFT
 
 _BAR = 0.2
-"""Height of a bar with its space [inches]."""
-_AROUND = 1.1
+"""Height of a bar with the space around it [inches]."""
+_AROUND = 1.1  # title and axis of a panel [inches]
 _LETTER = 0.075
-"""Width of a letter of a name [inches]."""
-_LONGEST = 40
+"""Width of a letter of a bar's name [inches]."""
+_LONGEST = 40  # letters of a bar's name; longer ones are cut
 Shares = Mapping[str, Mapping[str, int]]
-"""Name of a bar -> its parts -> how many."""
+"""Name of a bar -> its sections -> their counts."""
 
 
 def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
-    """A panel for each that has bars; parts are in the order of `COLORS`, others are grey and come last."""
+    """Draw one panel of stacked bars for each entry.
+
+    Sections have the order of `COLORS`; others are grey and come last.
+    """
     from matplotlib.patches import Patch
 
     met = {part for bars in panels.values() for parts in bars.values() for part in parts}
@@ -27,6 +30,7 @@ def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
 
 
 def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> FigurePanel:
+    """Return a panel of stacked bars; each bar is normalised to 1, with its count at the right."""
     names = [name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…" for name in bars]
     totals = [sum(parts.values()) for parts in bars.values()]
 

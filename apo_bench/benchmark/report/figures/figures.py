@@ -1,4 +1,4 @@
-"""Every figure of a sweep that has something to show, by the name of its file."""
+"""Draw every figure of a sweep that has data, by the name of its file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.records import knows_truth, may_reobserve
 
 _FLOOR_MM = 1e-3
-"""Smaller gaps are drawn here: they are residuals of solvers."""
+"""Smaller gaps are drawn at this value, since they are residuals of solvers."""
 
 
 def figures(
@@ -33,7 +33,12 @@ def figures(
     detections: Sequence[Line],
     times: Sequence[Line],
 ) -> dict[str, Figure]:
-    """All figures with a panel."""
+    """Draw all figures that have data; returns name -> figure.
+
+    Args:
+        settings: The settings that get a panel each.
+        gaps, confusions, detections, times: Lines of the tables of the same names.
+    """
     by_setting = group_by_setting(settings, results)
     level = "; ".join(dict.fromkeys(get_level_unit(setting.noise) for setting in settings))
     tightness = Axes("clearance per side over noise level [mm per mm]", "success", "percent")
@@ -75,7 +80,10 @@ def figures(
 
 
 def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[IntervalMark]:
-    """A panel for each setting with two noise levels or more; without one, for each setting; the oracle at each."""
+    """Mark success for each setting with two noise levels or more; if there is none, for each setting.
+
+    The oracle, which noise does not affect, is marked at every level.
+    """
     levels = {s: list_levels(own) for s, own in by_setting.items()}
     least = min(2, max(map(len, levels.values()), default=1))
     return [
@@ -88,33 +96,34 @@ def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> li
 
 
 def _title(setting: Condition, results: Sequence[ConditionResult]) -> str:
-    """With the number of trials of its conditions."""
+    """Return the title of a setting with the range of its numbers of trials."""
     trials = [c.trials for c in results]
     return f"{setting.title}; n\u00a0{' to '.join(map(str, dict.fromkeys((min(trials), max(trials)))))}"
 
 
 def _gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[IntervalMark]:
-    """Observed gaps, which are the same for every method, and planned ones."""
+    """Mark the observed gaps, once for all methods, since these share them, and the planned gaps of each method."""
     of = {line["condition"]: line for line in lines}
     here = [(s, condition) for s, inside in group_by_setting(settings, list(of)).items() for condition in inside]
     observed = [_mark(s, replace(c, method="observed"), *_percentiles(of[c], "observed")) for s, c in here]
-    once = {mark[:3]: mark for mark in observed}
+    once = {mark[:3]: mark for mark in observed}  # one mark per panel and level
     return [*once.values(), *(_mark(s, c, *_percentiles(of[c], "planned")) for s, c in here)]
 
 
 def _percentiles(line: Line, of: str) -> list[float]:
+    """Return median, 5th and 95th percentile of a kind of gap, at least `_FLOOR_MM`."""
     return [max(line[f"{of}_{name}"], _FLOOR_MM) for name in ("median_mm", "5", "95")]
 
 
 def _detected(lines: Sequence[Line]) -> list[IntervalMark]:
-    """Over all scenarios where there are several."""
+    """Mark precision and recall of detected contacts, over all scenarios if there are several."""
     return [
         IntervalMark(
             f"{what}; {line['noise']}, human error {line['human_error_scale']:g}",
             line["contact_source"],
             (line["noise_mm"], line["noise_deg"]),
             format_noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
-            *[line[what]] * 3,
+            *[line[what]] * 3,  # value without an interval
         )
         for line in [line for line in lines if line["scenario"] == ALL] or lines
         for what in ("precision", "recall")
@@ -123,12 +132,13 @@ def _detected(lines: Sequence[Line]) -> list[IntervalMark]:
 
 
 def _times(lines: Sequence[Line]) -> list[IntervalMark]:
+    """Mark median, 5th and 95th percentile of the time of a trial."""
     names = ("trial_median_s", "trial_5_s", "trial_95_s")
     return [IntervalMark(line["scenario"], *[line["method"]] * 3, *(line[name] for name in names)) for line in lines]
 
 
 def _over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMark]:
-    """All methods, if several numbers were allowed."""
+    """Mark success of all methods, if trials with several limits of reobservations exist."""
     several = len({c.max_reobservations for c in results if may_reobserve(c.method)}) > 1
     return [
         IntervalMark(
@@ -145,7 +155,7 @@ def _over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMar
 
 
 def _over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
-    """All clearances together, if a scenario has several."""
+    """Mark success of all clearances in one panel, if a scenario has several clearances."""
     several = len({(c.scenario, c.clearance_mm) for c in results}) > len({c.scenario for c in results})
     return [
         IntervalMark(
@@ -157,7 +167,7 @@ def _over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
 
 
 def _stages(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> dict[str, Shares]:
-    """A bar for every condition: success, then the stages that failed."""
+    """Return a bar for every condition: success, then the stages of failures."""
     bars = {
         s.title: {f"{c.method}, {c.noise_words}": _endings(c) for c in own if c.trials} for s, own in by_setting.items()
     }
@@ -165,6 +175,7 @@ def _stages(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> dict[s
 
 
 def _endings(result: ConditionResult) -> dict[str, int]:
+    """Return success and stages of failures of a condition -> number of trials."""
     counts = {"success": result.successes} if result.successes else {}
     for why, count in result.failures.items():
         stage = why.partition(":")[0]
@@ -173,7 +184,7 @@ def _endings(result: ConditionResult) -> dict[str, int]:
 
 
 def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
-    """A bar for every method: the prediction and the result."""
+    """Return a bar for every scenario and method: combinations of prediction and result."""
     kinds = ("fit_fitted", "fit_failed", "fail_fitted", "fail_failed")
     bars = {
         f"{line['scenario']}, {line['method']}": {kind.replace("_", ": "): line[f"predicted_{kind}"] for kind in kinds}
@@ -184,6 +195,6 @@ def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
 
 
 def _mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> IntervalMark:
-    """A value at a noise level."""
+    """Return the mark of a value with its interval at the noise level of a condition."""
     level = (condition.noise_mm, condition.noise_deg)
     return IntervalMark(setting.title, condition.method, level, format_noise(level, setting.noise), value, low, high)

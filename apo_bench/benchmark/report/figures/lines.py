@@ -1,4 +1,4 @@
-"""Line figures with bands: a value of every method over a setting."""
+"""Draw line figures: a value of every method, with an interval band, over a setting."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -11,26 +11,28 @@ from apo_bench.io import group_by
 
 _APART = 0.08
 _WITHIN = 0.4
-"""Methods stand this far from each other at one value, so that equal ones do not hide each other; and all of them
-within this part of the way to the next value."""
+"""Methods are shifted by `_APART` of the distance between two values of the axis, so that equal ones stay visible.
+
+All shifts together are at most `_WITHIN` of that distance.
+"""
 
 
 class IntervalMark(NamedTuple):
-    """A value with its interval, and where it stands."""
+    """A value with its interval, and its position in a figure."""
 
     panel: str
     line: str
     at: Any
-    """Its place among the values of the horizontal axis, which stand side by side at equal distances, in order."""
+    """Its position on the horizontal axis; distinct positions are sorted and drawn at equal distances."""
     label: str
-    """How the axis says it."""
+    """Label of the position on the axis."""
     value: float
     low: float
     high: float
 
 
 class Axes(NamedTuple):
-    """What the axes of a figure say."""
+    """Labels of the axes, and the scale of the vertical one."""
 
     x: str
     y: str
@@ -39,13 +41,14 @@ class Axes(NamedTuple):
 
 
 def line_figure(title: str, marks: Sequence[IntervalMark], axes: Axes) -> Figure:
-    """A panel for each that has marks, and a line in it for each method."""
+    """Draw a panel for each name that marks have, with a line for each method."""
     looks = styles(list(dict.fromkeys(mark.line for mark in marks)))
     panels = group_by((mark.panel, mark) for mark in marks)
     return draw(title, [_panel(name, own, axes, looks) for name, own in panels.items()], _legend(looks))
 
 
 def _panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[str, Style]) -> FigurePanel:
+    """Return a panel with the lines of its marks."""
     conditions = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
     labels = {conditions[mark.at]: mark.label for mark in marks}
     lines = group_by((mark.line, mark) for mark in marks)
@@ -64,9 +67,9 @@ def _panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[st
 
 
 def _line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> None:
-    """A line with its band; of a single mark a bar."""
+    """Draw a line with its interval band; a single mark has an interval bar."""
     order = np.argsort(x, kind="stable")
-    value, low, high = np.array([mark[-3:] for mark in marks], dtype=float)[order].T
+    value, low, high = np.array([mark[-3:] for mark in marks], dtype=float)[order].T  # the last three fields
     axis.plot(x[order], value, color=style.color, marker=style.marker, linestyle=style.dashes, markersize=6, zorder=3)
     if len(marks) == 1:
         axis.vlines(x, low, high, color=style.color, alpha=0.6)
@@ -75,6 +78,7 @@ def _line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> Non
 
 
 def _scale(axis: Any, kind: str) -> None:
+    """Set the scale of the vertical axis: `percent`, `points`, `log` or `plain`."""
     if kind == "percent":
         axis.set_ylim(-0.02, 1.02)
         axis.set_yticks((0.0, 0.25, 0.5, 0.75, 1.0), ("0 %", "25 %", "50 %", "75 %", "100 %"))
@@ -83,12 +87,13 @@ def _scale(axis: Any, kind: str) -> None:
         axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:+.0f}")
     elif kind == "log":
         axis.set_yscale("log")
-        # matplotlib's own labels are formulas, which are not parsed here
+        # matplotlib's own logarithmic labels are formulas, which figures here do not parse
         axis.yaxis.set_major_formatter("{x:g}")
         axis.yaxis.set_minor_formatter("")
 
 
 def _legend(looks: dict[str, Style]) -> dict[str, Any]:
+    """Return name -> sample of the line for the legend."""
     from matplotlib.lines import Line2D
 
     return {

@@ -1,4 +1,4 @@
-"""A figure of panels below one legend, as SVG and PNG."""
+"""Draw a figure of panels below one legend, and write it as SVG or PNG."""
 
 import io
 import textwrap
@@ -12,22 +12,22 @@ from apo_bench.benchmark.report.figures.style import report_looks
 from apo_bench.io import save_figure, write_file
 
 _ACROSS = 3
-"""Panels in a line."""
-_WIDTH = 5.0
+"""Number of panels in a row."""
+_WIDTH = 5.0  # width of a panel [inches]
 _HEIGHT = 3.2
-"""Of a panel with its title [inches]."""
-_LEFT = 0.75
-_BELOW = 0.6
-_ABOVE = 0.45
-_RIGHT = 0.15
-"""Around the axes of a panel [inches]."""
-_HEAD = 0.45
+"""Height of a panel with its title [inches]."""
+_LEFT = 0.75  # left of the axes of a panel [inches]
+_BELOW = 0.6  # below them
+_ABOVE = 0.45  # above them
+_RIGHT = 0.15  # right of them
+"""Margins around the axes of a panel [inches]."""
+_HEAD = 0.45  # height of the figure's title
 _LEGEND_LINE = 0.22
-"""Above the panels: the title, and a line of the legend [inches]."""
+"""Height of a line of the legend [inches]."""
 _LETTERS = 58
-"""Of a line of a panel's title."""
+"""Most letters in a line of a panel's title."""
 _NAMES = 130
-"""Letters of a line of the legend, samples included."""
+"""Most letters in a line of the legend of a figure with three panels in a row; a sample counts as eight."""
 
 
 class FigurePanel(NamedTuple):
@@ -43,16 +43,16 @@ class FigurePanel(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Figure:
-    """A figure that was drawn."""
+    """A drawn figure."""
 
     title: str
     panels: int
     svg: str
     canvas: Any
-    """Matplotlib's figure."""
+    """The figure of matplotlib."""
 
     def write(self, path: Path) -> Path:
-        """Write it as SVG, or as PNG by the ending."""
+        """Write the figure as PNG if the path ends in `.png`, else as SVG; return the path."""
         if path.suffix == ".png":
             with report_looks(self.title):
                 save_figure(self.canvas, path, dpi=110)
@@ -62,19 +62,20 @@ class Figure:
 
 
 def draw(title: str, panels: Sequence[FigurePanel], legend: Mapping[str, Any]) -> Figure:
-    """Draw every panel.
+    """Draw panels in rows below a title and one legend.
 
     Args:
-        legend: Name -> what makes a sample of it: a matplotlib artist.
+        legend: Name -> matplotlib artist that is its sample.
     """
     with report_looks(title), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a box replaces a letter that the font does not have
         from matplotlib import figure as mpl
 
         across = min(_ACROSS, len(panels))
-        heights = [max(p.height for p in panels[i : i + across]) for i in range(0, len(panels), across)]
+        heights = [max(p.height for p in panels[i : i + across]) for i in range(0, len(panels), across)]  # of each row
+        # of the legend
         columns = max(1, min(len(legend), across * _NAMES // 3 // (8 + max(map(len, legend), default=0))))
-        head = _HEAD + _LEGEND_LINE * -(-len(legend) // columns)
+        head = _HEAD + _LEGEND_LINE * -(-len(legend) // columns)  # -(-a // b) rounds up
         width = across * _WIDTH
         height = head + sum(heights)
         canvas = mpl.Figure(figsize=(width, height))
@@ -92,4 +93,5 @@ def draw(title: str, panels: Sequence[FigurePanel], legend: Mapping[str, Any]) -
         file = io.StringIO()
         canvas.savefig(file, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     svg = file.getvalue()
+    # without the XML declaration, to be embedded in HTML
     return Figure(title, len(panels), svg[svg.index("<svg ") :], canvas)

@@ -1,4 +1,4 @@
-"""Colours, markers and dashes of figures."""
+"""Colours, markers, dashes and matplotlib settings of all figures."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -7,22 +7,22 @@ from typing import Any, NamedTuple
 from apo_bench.io import use_figure_style
 
 INK = "#1d2430"
-"""Of text and lines."""
+"""Colour of text and lines."""
 SOFT = "#5b6575"
-"""Of what matters less."""
+"""Colour of details."""
 RULE = "#d9dde4"
-"""Of the grid."""
+"""Colour of the grid."""
 _SOLID: Any = "-"
 _DASHED = (0, (4, 1.5))
 _DOTTED = (0, (1, 1))
 
 
 class Style(NamedTuple):
-    """How the line of a method looks."""
+    """The style of the line of a method."""
 
     color: str
     marker: Any
-    """As matplotlib takes it: a letter, or a star as (points, 1, turned by degrees)."""
+    """As matplotlib takes it: a letter, or a star as (number of points, 1, rotation in degrees)."""
     dashes: Any
 
 
@@ -41,7 +41,7 @@ STYLES = {
     "penalty": Style("#88ccee", "d", _DOTTED),
 }
 OWN_STYLES = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
-"""Of methods that do not come with the package, in turn."""
+"""Styles of methods that do not come with the package, used in turn."""
 COLORS = {
     "success": "#cfe3dc",
     "observe": "#999999",
@@ -60,8 +60,8 @@ COLORS = {
     "fail: fitted": "#ddaa33",
     "fail: failed": "#0072b2",
 }
-"""How a trial ended, or what was predicted and came of it -> the colour of its share."""
-_LOOKS: Any = {
+"""Outcome of a trial, or pair of prediction and outcome -> colour of its section of a bar."""
+_LOOKS: Any = {  # settings of matplotlib
     "svg.fonttype": "none",
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -84,13 +84,13 @@ _LOOKS: Any = {
 
 
 def styles(names: Sequence[str]) -> dict[str, Style]:
-    """One each; what has no style of its own takes the next that is left."""
+    """Return a style for each name; names without a style of their own take those of `OWN_STYLES` in turn."""
     own = [name for name in names if name not in STYLES]
     return {name: STYLES[name] if name in STYLES else OWN_STYLES[own.index(name) % len(OWN_STYLES)] for name in names}
 
 
 @contextmanager
 def report_looks(secret_seed: str) -> Iterator[None]:
-    """Matplotlib's own settings but for these; one text as salt gives one file."""
+    """Draw with the settings of reports; `secret_seed` determines the ids of an SVG, so figures are reproducible."""
     with use_figure_style(_LOOKS | {"svg.hashsalt": secret_seed}):
         yield

@@ -1,4 +1,4 @@
-"""The matrix of a page, methods over noise levels, and the trials behind each of its cells.
+"""The matrix of a page, methods over noise levels, and the packed trials behind its cells.
 
 A cell is a button that opens its trials.
 """
@@ -27,35 +27,35 @@ from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.trials import Trials
 
 _DECIMALS = {"extra_steps": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
-"""Of numbers; of those in mm and degrees, and of others, three."""
+"""Decimals of numbers; others have three."""
 
 
 class Button(NamedTuple):
-    """A cell that opens its trials."""
+    """A cell of the matrix, which opens its trials."""
 
     number: int
-    """Among all cells."""
+    """Its number among all cells of the page."""
     cell: ConditionResult
     span: int
-    """Levels that it holds for: the oracle meets none, so it stands for all."""
+    """Number of columns that it spans: more than one for the oracle, which noise does not affect."""
 
 
 class Matrix(NamedTuple):
-    """Of one setting."""
+    """The matrix of one setting."""
 
     title: str
-    corner: str
+    corner: str  # text above the methods
     head: Sequence[str]
-    """The levels."""
+    """The noise levels."""
     lines: Sequence[tuple[str, Sequence[Button | None]]]
-    """Method, and its cells; None where a level was not run."""
+    """Methods with their cells; None for a level that was not run."""
 
 
 def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mapping[Condition, int]) -> Matrix:
-    """The cells of a setting.
+    """Arrange the cells of a setting by method and noise level.
 
     Args:
-        numbers: Condition -> its number among all cells.
+        numbers: Condition -> its number among all cells of the page.
     """
     levels = list_levels(cells)
     lines: list[tuple[str, list[Button | None]]] = []
@@ -70,7 +70,7 @@ def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mappin
 
 
 def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[str, int]) -> str:
-    """What the script needs to show the trials of any cell: base64 of gzip of JSON.
+    """Pack the trials of all cells for the script of the page: JSON, compressed by gzip, as base64.
 
     Args:
         pictures: `cell:seed` -> number of the picture of that trial.
@@ -84,7 +84,8 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
         "command": lambda row: without_seed(row, files, limits),
     }
     columns: dict[str, list[Any]] = {name: [] for name in ("seed", *words, *NUMBERS)}
-    known: dict[str, dict[str, int]] = {name: {} for name in words}  # texts are often the same: kept once, by number
+    # texts repeat often, so each is kept once, and columns hold its number
+    known: dict[str, dict[str, int]] = {name: {} for name in words}
     for own in cells:
         columns["seed"] += own.values("seed")
         for name in NUMBERS:
@@ -93,7 +94,7 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
             for name, say in words.items():
                 columns[name].append(known[name].setdefault(say(row), len(known[name])))
     values = {
-        "ends": np.cumsum([len(own) for own in cells]).tolist(),
+        "ends": np.cumsum([len(own) for own in cells]).tolist(),  # the end of each cell's trials in the columns
         "words": {name: list(texts) for name, texts in known.items()},
         "numbers": [[name, label, _DECIMALS.get(name, 3)] for name, label in NUMBERS.items()],
         "columns": columns,
@@ -104,7 +105,7 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
 
 
 def _rounded(x: Any, decimals: int) -> float | int | None:
-    """A number as it is shown; the script writes the zeros at the end."""
+    """Round a number as it is shown; the script adds trailing zeros."""
     if x is None or isinstance(x, int):
         return x
     near = round(float(x), decimals)

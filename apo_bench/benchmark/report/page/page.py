@@ -1,6 +1,6 @@
-"""An HTML page of sections from one template.
+"""Render an HTML page of sections from one template.
 
-It has no address outside it, and a policy that lets a browser load none.
+The page refers to no other address, and its content security policy lets a browser load none.
 """
 
 import base64
@@ -18,26 +18,27 @@ from apo_bench.benchmark.analysis import format_percent, format_percent_interval
 
 
 class Section(NamedTuple):
-    """A part of a page."""
+    """A section of a page."""
 
     name: str
     """Its anchor."""
     heading: str
     blocks: Sequence[tuple[str, Any]]
-    """What stands in it, each with the name of the macro of the template that shows it."""
+    """Its contents: name of the macro of the template that shows a block, and the argument of the macro."""
     open: bool = False
-    """Whether it is unfolded when the page opens."""
+    """Whether the section is unfolded when the page opens."""
 
 
 def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:
-    """HTML in one piece; whatever is not markup by its type is escaped.
+    """Return a page as HTML in one piece; text that is not of type `Markup` is escaped.
 
     Args:
-        answer: The sentences at the top, with `code` marked.
-        lead: Paragraphs below.
-        trials: What the script needs to show the trials of a cell.
+        answer: The sentences at the top, with code in backquotes.
+        lead: Paragraphs below the answer.
+        trials: The trials, as `pack_trials` packs them.
     """
     script = _file("page.js")
+    # the policy allows only the script with this hash
     known = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
@@ -57,13 +58,13 @@ def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Sectio
 
 
 def prose(text: str) -> Markup:
-    """Sentences in which `code` and *emphasis* are marked as in Markdown; `%` stays with its number."""
+    """Convert `code` and *emphasis* to HTML as in Markdown; a `%` is kept on the line of its number."""
     code = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
     return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", code))
 
 
 def as_data(content: bytes, kind: str) -> str:
-    """Bytes as an address of their own."""
+    """Return bytes as a data URL."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
@@ -92,5 +93,5 @@ def _template() -> Any:
 
 @cache
 def _file(name: str) -> str:
-    """A style sheet or script that lies beside this module."""
+    """Return the text of a style sheet or script in the folder of this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The HTML page of a sweep."""
+"""The HTML page of a sweep's report: its sections, pictures and commands."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -36,28 +36,29 @@ _BANDS = "Bands are 95 % intervals; methods stand a little apart so that equal r
 
 
 class Contents(NamedTuple):
-    """What a page is made of."""
+    """Everything that a page shows."""
 
     name: str
-    """Of the folder."""
+    """Name of the folder."""
     answer: str
-    """The sentences at the top, with `code` marked."""
+    """The sentences at the top, with code in backquotes."""
     trials: Trials
     results: Sequence[ConditionResult]
     figures: Mapping[str, Figure]
     tables: Mapping[str, Table]
     run: Mapping[str, Any]
-    """What `run.json` says."""
+    """The content of `run.json`."""
     pictures: Sequence[FailurePicture]
     no_pictures: Sequence[str]
-    """Why pictures are missing, in sentences."""
+    """Sentences on why pictures are missing."""
     beside: Sequence[str]
-    """Files beside the page, relative to it."""
+    """Paths of further files, relative to the page."""
 
 
 def report_page(c: Contents) -> str:
-    """The page, as HTML."""
+    """Return the page as HTML."""
     numbers = {result.condition: i for i, result in enumerate(c.results)}
+    # condition and seed of each picture
     shown = [(get_condition(picture.row), picture.row["seed"]) for picture in c.pictures]
     pictured = {f"{numbers[condition]}:{seed}": k for k, (condition, seed) in enumerate(shown) if condition in numbers}
     by_setting = group_by_setting(list_settings(c.results), c.results)
@@ -86,12 +87,13 @@ def report_page(c: Contents) -> str:
 
 
 def _shown(c: Contents, figures: Sequence[str], *tables: str) -> list[tuple[str, Any]]:
-    """Figures that there are, then tables, each with what its numbers are."""
+    """Return the blocks of a section: existing figures, then tables."""
     drawn = [("figure", c.figures[name]) for name in figures if name in c.figures]
     return [*drawn, *(("table", c.tables[name]) for name in tables)]
 
 
 def _pictures(c: Contents) -> list[tuple[str, Any]]:
+    """Return the blocks of the section on failures: pictures, and why others are missing."""
     missing = "; ".join(c.no_pictures) or "None was asked for, or no trial that was carried out failed."
     if not c.pictures:
         return [("missing", f"No picture: {missing}")]
@@ -100,6 +102,7 @@ def _pictures(c: Contents) -> list[tuple[str, Any]]:
 
 
 def _picture(c: Contents, number: int) -> dict[str, str]:
+    """Return title, description, command and image of a picture for the template."""
     row, jpeg, words = c.pictures[number]
     condition = get_condition(row)
     where = "" if condition is None else f"{condition.title}, noise {condition.noise_mm:g}, "
@@ -113,7 +116,7 @@ def _picture(c: Contents, number: int) -> dict[str, str]:
 
 
 def _run(c: Contents) -> list[tuple[str, Any]]:
-    """Command and tables of what was run, and links to what lies beside the page."""
+    """Return the blocks of the section on the run: command, tables of settings, and links to further files."""
     hosts = {line["host"] for line in c.tables["work"].items}
     command = [("command", c.run["command"])] if "command" in c.run else []
     none = "There is no run.json beside the rows, so versions and command are not known."
@@ -123,7 +126,7 @@ def _run(c: Contents) -> list[tuple[str, Any]]:
 
 
 def _scope(trials: Trials) -> str:
-    """What was tried, and what was left out."""
+    """Return a sentence that counts trials, scenarios, methods and seeds, and the trials that were left out."""
     names = ("scenario", "clearance_mm", "seed", "human_error_scale")
     tried = len(trials.groups(names).keys)
     excluded = len(trials.where(np.isnan(trials.number("success"))).groups(names).keys)

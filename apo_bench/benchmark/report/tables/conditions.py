@@ -15,15 +15,16 @@ _AXES = (
     "assumed_robot_error",
     "min_predicted_success",
 )
-"""Shown to people where they are not as usual in some cell."""
+"""Settings whose column people see only if some condition differs from the default."""
 
 
 def condition_table(cells: Sequence[ConditionResult]) -> Table:
-    """Axes that are as usual in every cell are left to files."""
+    """Return the table of success rates, one line per condition."""
     unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
     min_predicted_success = "min_predicted_success" in unusual
     has_prediction = any(c.predicted_success is not None for c in cells)
 
+    # a column of a setting; without a head, it is in files only
     def axis(name: str) -> TableColumn:
         return TableColumn(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
 
@@ -70,11 +71,12 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
 
 
 def _all_endings(cell: ConditionResult) -> str:
+    """Format all endings of a condition, for files."""
     return endings(cell.failures, most=None)
 
 
 def pair_table(pairs: Sequence[PairedComparison]) -> Table:
-    """One line per cell, method and reference."""
+    """Return the table of paired comparisons, one line per condition and reference."""
     return Table(
         pairs,
         (
@@ -133,7 +135,7 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
 
 
 def half_table(levels: Sequence[HalfLevel]) -> Table:
-    """One line per method and setting; in files a limit beyond the levels tried is empty."""
+    """Return the table of half levels, one line per method and setting; in files an estimate outside is empty."""
     return Table(
         levels,
         (

@@ -1,4 +1,4 @@
-"""Tables of lines that are counted over many conditions."""
+"""Tables of lines that summarise several conditions: gaps, probing, effort, time, calibration, prediction."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from apo_bench.benchmark.report.tables.table import Table, TableColumn, conditio
 
 
 def _words(*names: str) -> tuple[TableColumn, ...]:
-    """Columns of words, which have the names of settings."""
+    """Return text columns with the names of settings."""
     return tuple(TableColumn(name, name, words=True) for name in names)
 
 
@@ -16,7 +16,7 @@ _METHOD = _words("scenario", "method")
 
 
 def gap_table(lines: Sequence[Line]) -> Table:
-    """One line per condition."""
+    """Return the table of contact gaps, one line per condition."""
     return Table(
         lines,
         (
@@ -39,7 +39,7 @@ def gap_table(lines: Sequence[Line]) -> Table:
 
 
 def probing_table(lines: Sequence[Line]) -> Table:
-    """One line per condition of a robot that probes."""
+    """Return the table of a probing robot's base error, one line per condition."""
     heads = {"drawn": "drawn with", "assumed": "assumed", "estimated": "estimated", "std": "stated std"}
     return Table(
         lines,
@@ -65,7 +65,7 @@ def probing_table(lines: Sequence[Line]) -> Table:
 
 
 def effort_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario and method."""
+    """Return the table of extra steps and simulated time, one line per scenario and method."""
     return Table(
         lines,
         (
@@ -84,7 +84,7 @@ def effort_table(lines: Sequence[Line]) -> Table:
 
 
 def time_table(lines: Sequence[Line]) -> Table:
-    """Wall times, one line per scenario and method."""
+    """Return the table of wall times, one line per scenario and method."""
     return Table(
         lines,
         (
@@ -101,7 +101,7 @@ def time_table(lines: Sequence[Line]) -> Table:
 
 
 def work_table(lines: Sequence[Line]) -> Table:
-    """One line per worker."""
+    """Return the table of wall times of workers, one line per worker."""
     return Table(
         lines,
         (
@@ -114,7 +114,7 @@ def work_table(lines: Sequence[Line]) -> Table:
 
 
 def calibration_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario, noise, contact source and method."""
+    """Return the table of stated uncertainty against the truth; one line per scenario, noise, contacts and method."""
     share = "{{{0}.rate:percent}} of {{{0}.trials}}".format
     return Table(
         lines,
@@ -141,7 +141,7 @@ def calibration_table(lines: Sequence[Line]) -> Table:
 
 
 def confusion_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario and method, and one of them all."""
+    """Return the table of predictions against outcomes, one line per scenario and method, and one over all."""
     return Table(
         lines,
         (
@@ -166,7 +166,7 @@ def confusion_table(lines: Sequence[Line]) -> Table:
 
 
 def detection_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario, noise, pose source, contact source, human error scale and noise level."""
+    """Return the table of detected contacts, one line per scenario, noise, pose and contact source, and noise level."""
     return Table(
         lines,
         (
@@ -193,7 +193,7 @@ def detection_table(lines: Sequence[Line]) -> Table:
 
 
 def prediction_summary(line: Line) -> str:
-    """`Predicted: 129 of 134 executed trials ended as predicted (96.3 %, counted by as_demonstrated); failures ...`"""
+    """Summarise a line of predictions: `Predicted: 129 of 134 executed trials ended as predicted (96.3 %, ...`."""
     executed: Any = line["executed"]
     if not executed:
         return "Predicted: nothing, since no trial was executed."

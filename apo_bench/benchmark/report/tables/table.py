@@ -1,4 +1,4 @@
-"""A table whose columns give HTML, text, Markdown, CSV and Parquet."""
+"""A table, described once by columns, as HTML, text, Markdown, CSV and Parquet."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from apo_bench.benchmark.analysis import format_percent, format_percent_interval
 from apo_bench.io import escape_markdown, has_parquet, write_columns, write_csv
 
 DASH = "–"
-"""Stands for what is not known."""
+"""Text in place of an unknown value."""
 
 
 def _p_value(p: float) -> str:
@@ -20,7 +20,7 @@ def _p_value(p: float) -> str:
 
 
 def endings(failures: Mapping[str, int], most: int | None = 3) -> str:
-    """`attach: force_stop 12, judge: gap 3`: how trials failed, the most frequent first."""
+    """Format failures: `attach: force_stop 12, judge: gap 3`, at most `most` of them, the most frequent first."""
     return ", ".join(f"{why} {count}" for why, count in list(failures.items())[:most])
 
 
@@ -38,15 +38,15 @@ _SPELLED: Mapping[str, Callable[[Any], str]] = {
     "p": _p_value,
     "endings": endings,
 }
-"""How a template may write a number or an interval, besides the formats of Python."""
+"""Format specification of a template -> function, in addition to the formats of Python."""
 
 
 class _Unknown(Exception):
-    """Something that a template names is None."""
+    """Raised by a template if a value is None."""
 
 
 class _Template(Formatter):
-    """`{interval.low:.3f}` of any object or mapping."""
+    """Formats a template such as `{interval.low:.3f}` with the attributes or keys of one object."""
 
     def get_field(self, field_name: str, args: Any, kwargs: Any) -> tuple[Any, str]:
         return look_up(args[0], field_name), field_name
@@ -61,7 +61,7 @@ _TEMPLATE = _Template()
 
 
 def fill(template: str) -> Callable[[Any], str | None]:
-    """What a template says of an item; None where anything in it is None."""
+    """Return a function that fills a template from an item, or returns None if any value in it is None."""
 
     def say(item: Any) -> str | None:
         try:
@@ -73,7 +73,7 @@ def fill(template: str) -> Callable[[Any], str | None]:
 
 
 def look_up(item: Any, path: str) -> Any:
-    """What an object or mapping has at a path, as `interval.low`; None where something on the way is None."""
+    """Return the value at a path of attributes or keys, such as `interval.low`; None if any step is None."""
     for name in path.split("."):
         if item is not None:
             item = item[name] if isinstance(item, Mapping) else getattr(item, name)
@@ -81,25 +81,25 @@ def look_up(item: Any, path: str) -> Any:
 
 
 class TableColumn(NamedTuple):
-    """One of a table: with a name it is in files, with a head people read it."""
+    """A column of a table: with a name it is in files, with a head people see it."""
 
     name: str = ""
     head: str = ""
     value: str | Callable[[Any], object] = ""
-    """Path from what a line is of to what files hold, or a function; usually called like the column."""
+    """Path from an item to the value in files, or a function of the item; default: the name of the column."""
     text: str = ""
-    """Template of what people read; usually the value. Where anything in it is None it is a dash."""
+    """Template of the text that people see; default: the value. If a value in it is None, the text is a dash."""
     words: bool = False
-    """Set to the left, and broken into lines; else it is a number."""
+    """Whether the column is text, aligned left and wrapped; else it is numbers, aligned right."""
     group: bool = False
-    """A page says it once above all lines that have the same."""
+    """Whether a page states the value once as a heading above all lines that share it."""
 
     def of(self, item: Any) -> Any:
-        """What files hold of an item."""
+        """Return the value of an item for files."""
         return look_up(item, self.value or self.name) if isinstance(self.value, str) else self.value(item)
 
     def said(self, item: Any) -> str:
-        """What people read of it."""
+        """Return the text of an item for people."""
         value = fill(self.text)(item) if self.text else self.of(item)
         if value is None:
             return DASH
@@ -109,49 +109,53 @@ class TableColumn(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Table:
-    """Lines and columns."""
+    """Items, one per line, and the columns that describe them."""
 
     items: Sequence[Any]
     columns: Sequence[TableColumn]
     empty: str = "Nothing to show."
-    """Said to people where there is no line."""
+    """Sentence that replaces a table without lines."""
     note: str = ""
-    """What its numbers are, in sentences; `code` and *emphasis* are marked as in Markdown."""
+    """Explanation of the numbers, with `code` and *emphasis* marked as in Markdown."""
 
     @property
     def shown(self) -> list[TableColumn]:
-        """The columns that people read."""
+        """The columns that people see."""
         return [column for column in self.columns if column.head]
 
     @property
     def lines(self) -> list[list[str]]:
-        """What people read, line by line."""
+        """The texts that people see, line by line."""
         return [[column.said(item) for column in self.shown] for item in self.items]
 
     @property
     def ungrouped(self) -> list[TableColumn]:
-        """The columns of a page: those that people read and no line of which stands above its group."""
+        """The columns that people see, without those that a page states as headings."""
         return [column for column in self.shown if not column.group]
 
     def groups(self) -> list[tuple[str, list[list[str]]]]:
-        """What a page says: heading (empty where nothing is grouped), and the lines below it."""
+        """Return heading and lines of each group on a page; the heading is empty if no column is grouped."""
         together = groupby(self.items, lambda item: ", ".join(c.said(item) for c in self.shown if c.group))
         return [(heading, [[c.said(item) for c in self.ungrouped] for item in own]) for heading, own in together]
 
     def markdown(self) -> list[str]:
-        """The table as lines of Markdown, in which no cell has markup, or the sentence where there is none."""
+        """Return the table as lines of Markdown, with cells escaped; an empty table is its sentence."""
         heads = [column.head for column in self.shown]
         lines = [f"| {' | '.join(map(escape_markdown, cells))} |" for cells in (heads, *self.lines)]
         return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
 
     def write(self, path: Path) -> list[Path]:
-        """Write a CSV file, where None is an empty field, and the same as Parquet where pyarrow is installed."""
+        """Write the table as CSV, with empty fields for None, and also as Parquet if pyarrow is installed.
+
+        Returns:
+            The paths of the files.
+        """
         columns = {c.name: [c.of(item) for item in self.items] for c in self.columns if c.name}
         return save_columns(columns, path)
 
 
 def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]:
-    """Write columns as CSV and, where the package pyarrow is installed, as Parquet beside it; which files."""
+    """Write columns as CSV, and as Parquet next to it if the package pyarrow is installed; return the paths."""
     write_csv(path, list(columns), zip(*columns.values(), strict=True))
     if not has_parquet():
         return [path]
@@ -161,10 +165,11 @@ def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]
 
 
 def condition_columns(path: str = "condition", levels: bool = True) -> tuple[TableColumn, ...]:
-    """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
+    """Return the columns that identify a condition: few for people, one per setting for files.
 
     Args:
-        path: From an item to its condition.
+        path: Path from an item to its condition.
+        levels: Whether the noise level is part of the condition.
     """
     last = (
         "grasp",
@@ -194,10 +199,10 @@ def condition_columns(path: str = "condition", levels: bool = True) -> tuple[Tab
 
 
 def interval_columns(path: str = "interval", low: str = "low_95", high: str = "high_95") -> tuple[TableColumn, ...]:
-    """Both ends of an interval, for files."""
+    """Return the columns of both ends of an interval, for files."""
     return TableColumn(low, value=f"{path}.low"), TableColumn(high, value=f"{path}.high")
 
 
 def _text(x: Any) -> Any:
-    """A text without what is no letter in UTF-8 (names of folders may have some); anything else as it is."""
+    """Replace half letters, as names of folders may have, since UTF-8 has none; other values stay."""
     return x.encode("utf-8", "replace").decode() if isinstance(x, str) else x
