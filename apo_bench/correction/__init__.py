@@ -17,9 +17,9 @@ What one correction by `contact` calls, in the folder `contact` unless another i
             solved._describe                gaps, rank and covariance (solvers.posterior)
             solved._describe_in_full        instead, where contacts contradict each other, or with inequalities, play or
                                             tails; squared_length.relaxed_chi_square runs the loop again
-          contact._report                   the Correction, if it is in no doubt; otherwise
+          contact._report                   the Correction, if nothing is doubtful; otherwise
           contact._in_doubt                 not converged, the test fails, a pose turned far, faces look the same way
-            starts.best_start               other starts, each solved as above; none where only the test has failed
+            starts.best_start               other starts, each solved as above; none if only the test has failed
             suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
             contact._report                 the Correction
             checks.status.check_facing      `inconsistent` where faces look the same way
