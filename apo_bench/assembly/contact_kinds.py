@@ -39,10 +39,9 @@ def compute_geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
 
 
 def compute_play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
-    """How far two fit faces may be off, [mm]: the clearance if one is fit, plus the difference of radii of a shaft in a
-    hole.
+    """How far two fit faces may be off, [mm]; None for faces that only touch.
 
-    None for faces that only touch.
+    It is the clearance if one of them is fit, plus the radius of a hole minus that of its shaft.
     """
     fits = a.fit or b.fit
     if not fits and classify_contact(a, b) != "shaft in hole":

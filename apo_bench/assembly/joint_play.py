@@ -169,7 +169,8 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
 
     Args:
         own: Rows of the pair asked for, (k, 6).
-        rows, limits: Rows of all pairs, (m, 6), and how far each may close, (m,), [mm].
+        rows: Rows of all pairs, (m, 6).
+        limits: How far each row may close, (m,), [mm].
     """
     from scipy.optimize import linprog
 

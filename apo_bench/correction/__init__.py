@@ -17,14 +17,15 @@ What one correction by `contact` calls, in the folder `contact` unless another i
             solved._describe                gaps, rank and covariance (solvers.posterior)
             solved._describe_in_full        instead, where contacts contradict each other, or with inequalities, play or
                                             tails; squared_length.relaxed_chi_square runs the loop again
-          contact._report                   the Correction, if it is in no doubt; otherwise
+          contact._report                   the Correction, if nothing is doubtful; otherwise
           contact._in_doubt                 not converged, the test fails, a pose turned far, faces look the same way
-            starts.best_start               other starts, each solved as above; none where only the test has failed
+            starts.best_start               other starts, each solved as above; none if only the test has failed
             suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
             contact._report                 the Correction
             checks.status.check_facing      `inconsistent` where faces look the same way
 
-`solvers` know equations, `checks` refuse, end and test a correction. `baselines` are what `contact` is compared with
-(`paper` is the method as it was published), `robust` is the corrector that doubts observations, `calibration` estimates
-the errors of the robot from contact probing. The files outside these folders are the public calls.
+`solvers` solves equations; `checks` validates and tests corrections. `baselines` holds the correctors that `contact` is
+compared with (`paper` is the method as it was published). `robust` is the corrector that rejects outliers, and
+`calibration` estimates the errors of the robot from contact probing. The files outside these folders are the public
+calls.
 """

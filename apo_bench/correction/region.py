@@ -37,10 +37,13 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
 
 
 def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], truth: Array, level: float) -> bool | None:
-    """The same for one set of poses and the observation assumed for it.
+    """Whether the truth lies in the region of one set of poses, given the observation assumed for it.
 
     The region lies in the tangent space of the contact manifold at the poses. The squared length of the deviation
     there, in standard deviations, is chi-square distributed with as many degrees of freedom as directions are free.
+
+    Returns:
+        None if nothing is free, or there are too many operations.
     """
     from scipy.special import chdtri
 

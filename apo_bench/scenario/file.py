@@ -61,7 +61,7 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
 
 @lru_cache(maxsize=128)
 def _load_named(name: str) -> Scenario:
-    """Load a scenario of the package or a generated one, whose part files need no check."""
+    """Load a scenario of the package or a generated one; part files of the latter need no check."""
     return replace(_read(find_scenario_path(name), checked=not is_generated(name)), name=name)
 
 

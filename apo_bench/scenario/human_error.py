@@ -51,6 +51,7 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
             offsets[k] = offset
         elif k < len(assembly) - 1:
             offsets[k] = R.T @ _guided(assembly, operation, stages[k + 1], displaced)
+        # R @ R_before^t: rotation of the main part by this operation, world.
         displaced = _displaced(operation, R @ stages[k][operation.main][:3, :3].T, R @ offsets[k], displaced)
     return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
 

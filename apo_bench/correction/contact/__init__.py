@@ -1,1 +1,1 @@
-"""The corrector `contact`: its problem, the nearest poses, their test, other starts, and which relation to suspect."""
+"""The corrector `contact`: most likely consistent poses, with test, posterior, suspects and other starts."""

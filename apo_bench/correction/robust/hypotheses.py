@@ -92,9 +92,7 @@ class SolvedHypothesis:
 
     @property
     def key(self) -> tuple[States, tuple[str, ...], bool]:
-        """What the hypothesis assumes, as a key: states, dropped relations, and whether the noise is larger than
-        stated.
-        """
+        """The assumptions as a key: states, dropped relations, and whether the noise is larger than stated."""
         return self.states, self.dropped, self.scale > 1.0
 
     @property

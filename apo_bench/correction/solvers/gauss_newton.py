@@ -1,15 +1,15 @@
 """The point on the contact manifold that is nearest to what was observed, in the metric of its noise.
 
-What was observed is wrong by a Gaussian body twist, T_observed = T exp(-xi), of stated covariance L L^t, so with
-z = L^-1 xi the most likely consistent poses are those with the shortest z among all that satisfy the contact equations
-f(z) = 0. They are found by projection: with f linearised at z, J z' = J z - f has the shortest solution
+The error of an observation is a Gaussian body twist, T_observed = T exp(-xi), of stated covariance L L^t. With
+z = L^-1 xi the most likely consistent poses have the shortest z that satisfies the contact equations f(z) = 0. They are
+found by projection: with f linearised at z, J z' = J z - f has the shortest solution
 z' = J^t (J J^t)^-1 (J z - f); then f is linearised again (Gauss-Newton on the constraint; Nocedal and Wright,
 "Numerical Optimization", 18).
 
-Redundant contacts make J J^t singular at the solution and almost singular before it, so no rank is decided on the way.
-`mu` is added to the diagonal instead; it falls with the square of the gap (Levenberg-Marquardt as of Yamashita and
-Fukushima, 2001, converges quadratically then, also where J loses rank), and by a factor at every iteration. Rank and
-free directions are read off where the solver rests: there singular values of redundant directions are rounding.
+Redundant contacts make J J^t singular at the solution and almost singular before it, so no rank is determined on the
+way. `mu` is added to the diagonal instead. It falls with the square of the gap, and by a factor at every iteration.
+Levenberg-Marquardt then converges quadratically, also where J loses rank (Yamashita and Fukushima, 2001). Rank and free
+directions are computed where the solver has converged: there singular values of redundant directions are rounding.
 
 There is one loop, over a batch of observations of one assembly; one observation is a batch of one. A `LinearStep`
 states how J is kept and how the linear equations are solved: dense or sparse matrices.

@@ -103,7 +103,10 @@ def _ever_carries(assembly: Assembly, a: PartFace, b: PartFace) -> bool:
 
 
 def _looseness(assembly: Assembly, contact: Contact, play_m: float, unit_m: float) -> float:
-    """How far a contact may be off, in units of the largest play; for a sheet of a shaft in a hole, the disc counts."""
+    """How far a contact may be off, in units of the largest play.
+
+    A sheet of a plane through the axis counts less, since the play of a shaft is a disc.
+    """
     size = assembly.play(contact, play_m) / unit_m if unit_m else 0.0
     return size * _DISC if contact in assembly.origin and not assembly.face(contact.manipulated).opposes else size
 

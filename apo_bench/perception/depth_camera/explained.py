@@ -13,7 +13,7 @@ from apo_bench.perception.depth_camera.regions import Mask
 _CLOSE_M = 0.005
 """A pixel agrees with a model if their distances differ by less than this."""
 _CLOSE_DEVIATIONS = 2.5
-"""Or by less than so many standard deviations of one ray; smoothing halves the noise."""
+"""The same limit in standard deviations of one ray; the larger limit counts. Smoothing halves the noise."""
 _AROUND = 12
 """Margin around a changed region, in pixels, in which a wrong model is penalised."""
 

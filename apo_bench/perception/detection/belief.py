@@ -18,8 +18,7 @@ class PartBeliefs(NamedTuple):
 
     poses: Poses
     reach: Mapping[str, Array]
-    """Part -> (6, 6 n), Jacobian of the world twist (v, w) of the part, about the world origin, by the body twists of
-    all n poses."""
+    """Part -> (6, 6 n), Jacobian of its twist (v, w) about the world origin, by the body twists of all n poses."""
 
 
 @final

@@ -30,7 +30,7 @@ from apo_bench.perception.detection.evidence import (
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
 
 _BEGINNINGS = 12
-"""At most so many candidates are tried as the first contact of an operation."""
+"""Largest number of candidates that are tried as the first contact of an operation."""
 
 
 @check_arguments

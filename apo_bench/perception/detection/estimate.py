@@ -1,9 +1,9 @@
 """Estimate poses under a hypothetical set of contacts, and the Bayes factor of that set.
 
 If the contacts hold, the observation is Gaussian about the contact manifold. If not, parts lie anywhere in a range much
-wider than the noise. The contact residual of the observation, r = J xi - e, has the covariance J C J^t + S in the first
-case and J (C + R) J^t + S in the second. C is the noise, R the range and S the effect of play and soft contacts. The
-set explains the observation better than chance by
+wider than the noise. The contact residual of the observation is r = J xi - e. Its covariance is J C J^t + S in the
+first case and J (C + R) J^t + S in the second. C is the noise, R the range and S the effect of play and soft contacts.
+The set explains the observation better than chance by
 
     log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
 
@@ -31,7 +31,7 @@ from apo_bench.perception.detection.thresholds import CONTACT_SOFT_M
 _ROOM = copy_frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
 """(6,): standard deviation of the pose of a part near others that it does not touch, [m, rad]."""
 _CARRIED = 3.0
-"""A contact of an operation that carries parts is off by the sum of so many independent plays."""
+"""Number of independent plays that add up in a contact of an operation that carries parts."""
 _TURNS = 6
 """Gauss-Newton steps at most."""
 _SMALL = 1e-5
@@ -111,8 +111,8 @@ def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
 def _softness(assembly: Assembly, play_m: float) -> Array:
     """The diagonal covariance (m, m) of the residuals of true contacts, from play and softness, [m^2].
 
-    The variance of each equation is multiplied by the number of equations of its contact, so that their mean has the
-    variance that a single equation would have.
+    Each variance is multiplied by the number of equations of its contact: all of them are off together, so their mean
+    must not become more certain than one equation.
     """
     each = []
     flat = project_round_faces(assembly)

@@ -124,6 +124,7 @@ class _Search:
     rules: Rules
     k: int
     others: tuple[str, ...]
+    """Parts in place that the operation does not move."""
     history: _History
 
     def endings(self) -> Iterator[_Partial]:
@@ -145,11 +146,12 @@ class _Search:
                 break
             while (best := self._likeliest(partial)) is not None:
                 steps += 1
-                if best.implied:
+                if best.implied:  # no decision: accept all implied candidates at once
                     partial = self._taking(partial, tuple(c for c in self._open(partial) if c.implied))
                     continue
                 taking = self._taking(partial, (best,))
                 refusing = partial._replace(refused=partial.refused | {best.contact})
+                # A contact that forces the parts into each other is rejected without an alternative.
                 if inside(taking.at, self.rules, taking.taken, *best.parts) >= IMPOSSIBLE:
                     partial = refusing
                     continue

@@ -129,8 +129,8 @@ def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
     """The surprise that a released part stays: `_UNSUPPORTED` without support, else by how far its weight tips over.
 
-    It is 0 if the weight acts inside the support polygon, for parts with round faces, for parts that a face above holds
-    down, and for unobserved operations.
+    It is 0 if the weight acts inside the support polygon. It is also 0 for parts with round faces, for parts that a
+    face above holds down, and for unobserved operations.
     """
     solids = at.seen.assembly.solids
     if not at.seen.observed[at.k] or any(solids[part].rounds for part in at.moves):

@@ -136,6 +136,7 @@ def _split(table: msgspec.Struct, place: str, largest: float) -> Split:
 
 
 def _tail(scale: float, freedom: float) -> Tail:
+    """The tail of numbers in a file, where `_HUGE` stands for infinite degrees of freedom."""
     return Tail(scale, freedom if freedom < _HUGE else math.inf)
 
 
@@ -154,6 +155,7 @@ def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
 
 
 def _split_form(split: Split, unit: str) -> dict[str, float]:
+    """The `[shift]` or `[turn]` table of a distribution; the inverse of `_split`."""
     return {
         f"limit_{unit}": _digits(split.limit),
         f"across_scale_{unit}": _digits(split.across.scale),

@@ -77,8 +77,8 @@ class Camera:
         """Body twists (n, 6) of errors that are stated in the frames of the rays.
 
         The rotation comes first, then the shift in the observed frame: xi = (R_obs^t F d, R^t F w), with
-        R_obs = R exp(R^t F w). So the twist is linear in the error. If the error has covariance S in the frame of the
-        ray, the twist has exactly the covariance of `covariance` for that ray, as a rotation keeps its own axis.
+        R_obs = R exp(R^t F w). So the twist is linear in the error. Its covariance is exactly that of `covariance` for
+        the same ray, since a rotation keeps its own axis.
 
         Args:
             poses: (n, 4, 4), true poses, world frame, [m].

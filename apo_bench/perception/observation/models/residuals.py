@@ -23,7 +23,7 @@ _GAP_DEG = 55.0
 _IN_GAP = 1.0 / 30.0
 """An object is round if a larger fraction of its estimates lies in that gap; it is 14 % for uniform angles."""
 _FEWEST_ALIKE = 5
-"""At least so many gross estimates of an object have to agree on a fixed point."""
+"""Least number of gross estimates of an object that have to agree on a fixed point."""
 _ALIKE = 0.1
 """At least this fraction of the estimates of an object has to agree on it."""
 _NEAR = 4.0
@@ -111,8 +111,8 @@ class Residuals:
 def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     """Match estimates to the truth and compute their errors; estimates in images without truth are ignored.
 
-    Per image and object, parts and estimates are assigned with the least sum of distances (Hungarian method), without
-    a limit of distance and regardless of scores. `INLIER_MM` marks outliers afterwards. Matrices in the files are
+    Per image and object, parts and estimates are assigned with the least sum of distances (Hungarian method). There is
+    no limit of distance, and scores are ignored; `INLIER_MM` marks outliers afterwards. Matrices in the files are
     replaced by the nearest rotations.
     """
     from scipy.spatial.transform import Rotation

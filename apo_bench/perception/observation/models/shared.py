@@ -59,9 +59,9 @@ class ViewBiasNoise:
 
     Poses of moved parts relative to each other are nearly exact, those relative to fixed parts are not. The rotation
     is about the middle of the operations' poses, where the size is the level; about the camera, a degree would be
-    16 mm. The error of an operation, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same computed
-    from demonstrated and from observed poses. The stated covariance is about the middle of the observed poses, so it
-    contains nothing of the truth; e has the same distribution there.
+    16 mm. The error of an operation is xi = Ad(T^-1 P) e, with P the camera's axes in that middle. It is the same if
+    computed from observed poses. The stated covariance is about the middle of the observed poses, so it contains
+    nothing of the truth; e has the same distribution there.
     """
 
     noise_level: NoiseLevel

@@ -31,8 +31,8 @@ _MANY = 3.0
 class SymmetricNoise:
     """Isotropic noise about the centre of volume, with larger rotations about axes of symmetry.
 
-    About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
-    edges show its rotation. There the standard deviation is `WORSE` times the level.
+    About an axis of fourfold symmetry the second moments of a part are those of a body of revolution. Only its edges
+    show its rotation, so the standard deviation is `WORSE` times the level.
 
     Of the equivalent poses of a symmetric part, the one nearest to the truth is reported, since contacts name faces and
     so distinguish equal sides. A rotation error is thus at most half the angle between two equivalent poses.

@@ -1,9 +1,8 @@
 """The distribution of errors across and along a camera ray: independent Student t, truncated at a limit.
 
 Across the ray there are two equal directions, along it one. The same form serves for shifts [mm] and for rotations
-[deg] (about axes across the ray, and about the ray). Integrals over the truncated region use Gauss-Legendre quadrature
-along the ray, in y with x = s sinh(y), whose nodes are dense where the density is high. Across the ray they have a
-closed form.
+[deg] (about axes across the ray, and about the ray). Integrals along the ray use Gauss-Legendre quadrature in y with
+x = s sinh(y), whose nodes are dense where the density is high. Across the ray they have a closed form.
 """
 
 from dataclasses import dataclass

@@ -120,7 +120,7 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
     In each plane the areas of opposite faces are subtracted from each other, and faces of one name and fit are merged.
     """
     left = list(flats)
-    while left:
+    while left:  # each turn takes all faces in one plane n . x = d, of either direction
         n = left[0].normal
         d = float(n @ left[0].outline[0])
         on = [f for f in left if abs(abs(n @ f.normal) - 1.0) < _PARALLEL and abs(n @ f.outline[0] - d) < _SAME_M]

@@ -213,4 +213,5 @@ def outline_moments(outline: Outline) -> Moments:
 
 
 def _pair(point: Array) -> tuple[float, float]:
+    """An array (2,) as a tuple of floats."""
     return float(point[0]), float(point[1])

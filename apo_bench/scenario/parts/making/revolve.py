@@ -100,6 +100,7 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
     else:
         n = max(around.count, bore.count)
+        # Wedges of the lower and the upper polygon of the outer wall, cut off where the bore begins.
         for (u, first), (_, last) in zip(
             *[cut_wedges(inscribe_polygon((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
         ):

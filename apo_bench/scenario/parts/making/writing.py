@@ -192,12 +192,14 @@ def stated_text(
 
 
 def _plane_table(face: Face) -> dict[str, Any]:
+    """The entry of a flat face in the TOML file."""
     table = {"kind": "plane", "outline_mm": _list(1e3 * face.outline)}
     holes = {"holes_mm": [_list(1e3 * hole) for hole in face.holes]} if face.holes else {}
     return table | holes | {"fit": face.fit}
 
 
 def _round_table(wall: RoundFace) -> dict[str, Any]:
+    """The entry of a round face in the TOML file."""
     table: dict[str, Any] = {"kind": wall.kind, "at_mm": _list(1e3 * wall.point), "axis": _list(wall.axis, 12)}
     table["hole"] = wall.hole
     if wall.kind == "cone":
