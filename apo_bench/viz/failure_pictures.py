@@ -99,8 +99,8 @@ def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
 def _mark(contact: Contact | None, scene: Any, poses: Poses) -> Any:
     """Return an arrow that points down at the middle of the environment's face, or None.
 
-    If the environment is a fixed part, the arrow points at the face of the manipulated part, since the middle of a
-    fixed face may be far from the contact.
+    If the environment is a fixed part, the arrow points at the face of the manipulated part. The middle of a fixed
+    face may be far from the contact.
     """
     from apo_bench.simulation.scene.marks import Marks, ShiftArrows
 

@@ -17,8 +17,8 @@ def tabulate_calibration(records: Records) -> list[Line]:
     """Return one line per scenario, noise, contact source and method except the oracle.
 
     Each line covers every noise level, human error scale and clearance. It states how often the truth lies in the 95 %
-    region, the errors of planned poses along directions that contacts fix and leave free, and how often the test fails
-    and suspects the wrong contact.
+    region, and the errors of planned poses along directions that contacts fix and leave free. It also states how often
+    the test fails, and how often it then suspects the wrong contact.
     """
     trials = trials_of(records)
     counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))

@@ -43,8 +43,8 @@ _Others: Any = make_dataclass("_Others", _other_fields(), frozen=True)
 class Condition(_Others):  # type: ignore[misc]  # made from the settings, so that a new one is in tables as well
     """All settings of a trial that a sweep may vary, except the seed.
 
-    A condition also stands for a curve over noise levels (noise 0), and for a setting that a table or panel shows
-    (noise 0 and an empty method).
+    A condition with noise 0 also stands for a curve over noise levels. With an empty method as well, it stands for a
+    setting that a table or panel shows.
     """
 
     scenario: str

@@ -124,8 +124,7 @@ def compute_mean_surprise(values: Array, counts: Array, mean: float, low: float 
     """Return twice the log likelihood ratio of a mean; 0 at the mean of the sample.
 
     The likeliest weights are n_i / (n (1 + a (x_i - mean))); the probability that they leave lies on a bound. Twice the
-    log ratio is the maximum of 2 sum n_i log(1 + a (x_i - mean)) over all a that keep the weights positive at both
-    bounds.
+    log ratio is the maximum of 2 sum n_i log(1 + a (x_i - mean)) over a. The weights must be positive at both bounds.
 
     Args:
         values: Distinct values, (k,), from `low` to `high`.

@@ -11,9 +11,9 @@ from apo_bench.records.run.trials import Trials, trials_of
 def tabulate_confusion(records: Records) -> list[Line]:
     """Return one line per scenario and method, sorted as `tally` sorts, and a last line over all.
 
-    A plan predicts a success as demonstrated, which is called fitted here. Of the trials that were rightly predicted to
-    fail, `stopped` counts those in which the robot stopped at an operation, and `same_operation` those in which it
-    stopped at the predicted one. Trials without an executed plan count as not executed.
+    A plan predicts a success as demonstrated, which is called fitted here. The columns `stopped` and
+    `same_operation` are about trials that were rightly predicted to fail. They count those in which the robot stopped
+    at an operation, and at the predicted one. Trials without an executed plan count as not executed.
     """
     trials = trials_of(records)
     return [*(_line(*key, own) for key, own in by_method(trials).items()), _line(ALL, ALL, trials)]

@@ -185,9 +185,9 @@ def units(
 
     By this order an interrupted sweep has about equally many trials of each condition.
 
-    Noise and human error do not affect the oracle. So it runs once per seed, grasp and robot error, with noise level 0,
-    human error scale 0 and the first noise model or pose source in its record. For other methods, settings without
-    effect have their defaults.
+    Noise and human error do not affect the oracle. So it runs once per seed, grasp and robot error.
+    Its record has noise level 0, human error scale 0, and the first noise model or pose source. For other methods,
+    settings without effect have their defaults.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]  # grids that have this seed
