@@ -102,11 +102,12 @@ def _read(hint: Any) -> _Type:
 
 
 def _is_unchecked_protocol(origin: type) -> bool:
-    # isinstance does not work with a protocol that is not runtime-checkable
+    """Return whether a type is a protocol with which isinstance does not work."""
     return getattr(origin, "_is_protocol", False) and not getattr(origin, "_is_runtime_protocol", False)
 
 
 def _require(fits: object, value: Any) -> None:
+    """Raise `_Unfit` with this value unless a condition holds."""
     if not fits:
         raise _Unfit(value)
 

@@ -95,6 +95,7 @@ class RateTable:
         return target
 
     def _table(self) -> Any:
+        """Return the table of conditions that a report has, too."""
         from apo_bench.benchmark.analysis import tally
         from apo_bench.benchmark.report.tables.conditions import condition_table
 

@@ -406,6 +406,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return ended(code, said)
 
     def _seen(self) -> Seen:
+        """Return the present observation."""
         actions = self._actions
         seen = insert_observation(
             self._at_work(),
@@ -417,6 +418,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return {**seen, "pixels": self._picture(PIXELS, PIXELS)} if self._pixels else seen
 
     def _picture(self, width: int, height: int) -> Any:
+        """Render the arm and the parts as they are now."""
         from apo_bench.simulation.scene.render import picture_with_arm
 
         control = self._at_work()

@@ -119,5 +119,6 @@ def forward(weights: dict[str, Array], x: Array) -> Array:
 
 @cache
 def _weights() -> dict[str, Array]:
+    """Load the trained weights of the package."""
     with np.load(folder("assets") / "learned" / "insert.npz", allow_pickle=False) as kept:
         return {name: kept[name].astype(np.float64) for name in kept.files}

@@ -92,6 +92,7 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
         self._env.close()
 
     def _update_physics(self) -> None:
+        """Copy the present state to `physics`, if that exists."""
         if self._physics is not None:
             copy_data(self._env.unwrapped.mujoco_data(), self._physics.data.ptr)  # type: ignore[attr-defined]
 
@@ -127,6 +128,7 @@ def _spec(space: spaces.Space[Any], name: str) -> Any:
 
 
 def _arrays(observation: Any) -> Any:
+    """Convert an observation, with its nested dictionaries, to arrays."""
     if isinstance(observation, Mapping):
         return {key: _arrays(value) for key, value in observation.items()}
     return np.asarray(observation)

@@ -88,6 +88,7 @@ def _parts(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
 
 
 def _size(part: spaces.Space[Any]) -> int:
+    """Return the number of flat numbers of a part of an action space."""
     # a Discrete with n values is n numbers, the largest of which counts
     return int(part.n) if isinstance(part, spaces.Discrete) else int(np.prod(part.shape or ()))
 

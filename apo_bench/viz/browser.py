@@ -135,6 +135,7 @@ class Page:
         return self._shown[kind, number]
 
     def _aim_camera(self, rollout: Rollout) -> None:
+        """Aim the initial camera as in films, but nearer, and with the assembly left of the panel."""
         self._server.scene.set_up_direction("+z")
         self._server.scene.configure_default_lights(cast_shadow=False)
         at, far = frame_parts(rollout.scene.scenario.assembly, [rollout.assembled])
@@ -148,6 +149,7 @@ class Page:
         view.fov = _FOV_RAD
 
     def _add_controls(self) -> None:
+        """Add text, slider and buttons; their events are requests that `draw` processes."""
         gui = self._server.gui
         gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         gui.set_panel_label("apo-bench view")
@@ -160,6 +162,7 @@ class Page:
 
 
 def _server(port: int) -> Any:
+    """Start the viser server of a page at a port of this machine."""
     import viser
 
     try:

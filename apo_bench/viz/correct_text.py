@@ -103,6 +103,7 @@ def _describe_test(test: Consistency | None, contradictory: bool) -> str | None:
 
 
 def _operation_forms(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
+    """Return the corrected pose of each operation, with its distance from the observed pose and its covariance."""
     # D = observed^-1 corrected; the last three numbers of its log are a rotation vector, whose norm is the angle
     D = pose.inverse(observation.poses) @ correction.poses
     moved_mm = np.linalg.norm(D[:, :3, 3], axis=-1) * 1e3

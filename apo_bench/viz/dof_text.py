@@ -16,7 +16,7 @@ _SCHEMA = "apo-bench/explanation/1"
 DOF_COLUMNS = {"operation": "d", "part": "", "fixed": "", "free": "", "relations": "", "agreeing": ""}
 """Columns of `dof_rows`, with their formats."""
 PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
-"""How well each part is known at the end: keys of a part in `dof_form`, with their formats."""
+"""Columns of the uncertainty of each part at the end: keys of a part in `dof_form`, with their formats."""
 
 
 def count_directions(explanation: Explanation) -> str:
@@ -138,6 +138,7 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
 
 
 def _deviation(free: FreeDirection) -> float:
+    """Return the standard deviation along a free direction, in mm or degrees."""
     # the first three entries of TO_MM_DEG convert to mm, the last three to degrees
     return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
 
@@ -164,6 +165,7 @@ def _free_form(free: FreeDirection, T: Array) -> dict[str, Any]:
 
 
 def _hold_form(hold: RelationHold) -> dict[str, Any]:
+    """Return a relation that holds a part, as a JSON object; `lost` is null if the relation holds until the end."""
     return {
         "relation": hold.relation,
         "parts": list(hold.parts),

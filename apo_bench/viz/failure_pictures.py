@@ -52,6 +52,7 @@ def failure_pictures(
 
 
 def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePicture:
+    """Draw the final poses of a failed trial, with an arrow at the contact that failed."""
     import imageio.v3 as iio
 
     from apo_bench.scenario.file import is_named

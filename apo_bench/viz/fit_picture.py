@@ -49,6 +49,7 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
 
 
 def _draw_histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+    """Draw observed sizes as a histogram, with the density of the fitted distribution `cdf` up to `limit`."""
     # the cut tail may be long, but the axis has a width even if all sizes are 0
     top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
     # a bar of m sizes has height m / (n * bin width); n counts the sizes beyond the last bin too

@@ -98,6 +98,7 @@ def _percentiles(values: Array) -> list[float]:
 
 
 def _split_form(split: Split) -> dict[str, Any]:
+    """Return the fitted distributions across and along the ray as a JSON object."""
     return {"limit": split.limit} | {
         name: {"scale": t.scale, "degrees_of_freedom": t.freedom if np.isfinite(t.freedom) else None}
         for name, t in {"across": split.across, "along": split.along}.items()

@@ -41,12 +41,12 @@ class PlanLine(NamedTuple):
 
     @property
     def leaves(self) -> Arrival:
-        """How the part leaves its place."""
+        """The place that the part leaves, with the macros by which it departs."""
         return self.what.after if self.undo else self.what.before
 
     @property
     def comes(self) -> Arrival:
-        """How the part arrives at its new place."""
+        """The place that the part arrives at, with the macros by which it arrives."""
         return self.what.before if self.undo else self.what.after
 
     @property
@@ -128,6 +128,7 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
 
 
 def _cells(line: PlanLine) -> tuple[str, ...]:
+    """Return the cells of a step, in the order of `_HEADS`."""
     # main part, and the parts that it carries
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
     macros = []
@@ -164,6 +165,7 @@ def _state_form(arrival: Arrival) -> dict[str, Any]:
 
 
 def _macro_form(arrival: Arrival, macro: Macro) -> dict[str, Any]:
+    """Return a macro as a JSON object, with its direction also in the frame of the part."""
     return {
         "name": macro.name,
         "direction": macro.direction.tolist(),

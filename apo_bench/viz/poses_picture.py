@@ -1,4 +1,4 @@
-"""Where observed or corrected poses place the parts after an operation, as text and as a picture (Fig. 9, 13, 16)."""
+"""The parts at observed or corrected poses after an operation, as text and as a picture (Fig. 9, 13 and 16)."""
 
 import textwrap
 from collections.abc import Sequence
@@ -94,6 +94,7 @@ def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out:
 
 
 def _lines_below(panel: PosesPanel) -> list[PanelLine]:
+    """Return the lines below a picture: at most `_MOST_LINES` open contacts, then the warning."""
     lines = [f"all contacts hold: largest gap {1e3 * panel.gap_m:.3f} mm"]
     if panel.open:
         lines = [f"contacts that do not hold: {panel.open[0]}", *panel.open[1 : _MOST_LINES - 1]]

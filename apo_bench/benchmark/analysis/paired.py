@@ -119,7 +119,7 @@ def reference_condition(condition: Condition, reference: str) -> Condition:
 
 
 def _comparison(pair: PairedComparison) -> frozenset[Condition]:
-    # unordered, so that both directions of a comparison have one key
+    """Return the two compared conditions as an unordered pair."""
     return frozenset((pair.condition, reference_condition(pair.condition, pair.reference)))
 
 

@@ -20,6 +20,7 @@ def tabulate_confusion(records: Records) -> list[Line]:
 
 
 def _line(scenario: str, method: str, trials: Trials) -> Line:
+    """Return the line of a group of trials: counts of each prediction with each outcome."""
     counted = trials.where(~np.isnan(trials.number("success")))
     executed = counted.where(~np.isnan(counted.number("predicted_fails")) & was_executed(counted))
     fails = executed.number("predicted_fails") == 1

@@ -23,6 +23,7 @@ def tabulate_probing(records: Records) -> list[Line]:
 
 
 def _line(condition: Condition, trials: Trials) -> Line:
+    """Return the line of a condition; only trials of robots that probed are given."""
     assumed = parse_assumed_error(condition.assumed_robot_error, condition.robot_error)
     drawn_mm, drawn_deg = _as_vector(condition.robot_error)
     assumed_mm, assumed_deg = (None, None) if assumed is None else _as_vector(assumed)

@@ -145,6 +145,7 @@ def was_executed(trials: Trials) -> Mask:
 
 
 def _count(condition: Condition, trials: Trials) -> ConditionResult:
+    """Return the results of the trials of a condition."""
     counted = trials.where(~np.isnan(trials.number("success")))  # success is unknown if the demonstration failed
     failed = counted.where(counted.number("success") == 0)
     why = Counter(map("{}: {}".format, failed.values("failure_stage"), failed.values("failure_code")))

@@ -107,7 +107,7 @@ def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
 
 
 def _copy(part: str, i: int) -> str:
-    # name of the copy of a part in demonstration i
+    """Return the name of the copy of a part in demonstration i."""
     return f"{part}/{i}"
 
 

@@ -115,14 +115,13 @@ class _Recorder:
         self._looks: dict[str, list[Any]] = {name: [] for name in FRAMES if name != "episode"}
 
     def hooks(self) -> Hooks:
-        # called by the replay
         return Hooks(before_replay=self._planned, after_tick=self._tick)
 
     def _planned(self, plan: Plan) -> None:
-        # the plan that is executed
         self.plan = plan
 
     def _tick(self, data: Any, phase: Phase) -> None:
+        """Append a sample; called by the replay every 20 ms."""
         at = [get_part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
             float(data.time),

@@ -211,6 +211,7 @@ def _score_words(name: str, line: Line) -> str | None:
 
 
 def _brier(name: str, line: Line) -> str | None:
+    """Format the Brier score of an entry in a track; None if it has none."""
     track = line.entry.tracks.get(name)
     return None if track is None or track.brier is None else f"{track.brier:.3f}"
 

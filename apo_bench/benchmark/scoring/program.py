@@ -133,6 +133,8 @@ def _request_form(observation: Observation) -> dict[str, Any]:
 
 
 class _Answer(FileTable, frozen=True, kw_only=True):
+    """The answer of a program to a request."""
+
     poses: list[PoseForm]
     id: str = ""
 

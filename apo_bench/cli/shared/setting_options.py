@@ -59,6 +59,7 @@ def format_default(info: SettingInfo) -> str:
 
 
 def _trial_option(info: SettingInfo) -> Parameter:
+    """Return the option of a setting of one trial, which takes one value."""
     description = f"{info.help}; default: {format_default(info)}."
     if info.name == "secret_seed":
         return _parameter(info, Path, make_path_option(description))
@@ -66,16 +67,19 @@ def _trial_option(info: SettingInfo) -> Parameter:
 
 
 def _axis_option(info: SettingInfo) -> Parameter:
+    """Return the option of a setting of a sweep, which takes several values separated by commas."""
     usual = ",".join(_in_option_unit(info, value) for value in info.swept) or format_default(info)
     return _parameter(info, str, _option(info, f"{info.help}; several with commas; default: {usual}."))
 
 
 def _option(info: SettingInfo, description: str) -> Any:
+    """Return the typer option of a setting, with completion if its values are names."""
     named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
     return typer.Option(help=description, autocompletion=complete_last_word(info.name) if named else None)
 
 
 def _parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:
+    """Return a setting as a keyword-only parameter of a command, with default None."""
     annotation = Annotated[kind | None, option]
     return Parameter(info.keyword, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 

@@ -164,6 +164,7 @@ def _agreements(a: Trials, b: Trials) -> list[Line]:
 
 
 def _agreement(scenario: str, a: Trials, b: Trials) -> Line:
+    """Return the line on how often two sweeps agree, from their shared trials in the same order."""
     same = _same(a, b, ("success",))
     seeds, of = np.unique(a.number("seed"), return_inverse=True)
     alike = np.bincount(of, ~same, minlength=len(seeds)) == 0  # seeds without any differing verdict

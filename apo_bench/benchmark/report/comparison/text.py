@@ -175,7 +175,7 @@ def _between(name: str) -> str:
 
 
 def _label(line: Line) -> str:
-    # the head of the number's column
+    """Return the name of a record's number for people."""
     return NUMBERS[line["name"]]
 
 

@@ -74,6 +74,7 @@ def _svg(text: str) -> str:
 
 @cache
 def _template() -> Any:
+    """Load the template of a page, with its filters."""
     environment = Environment(
         loader=PackageLoader("apo_bench.benchmark.report.page"),
         autoescape=True,
