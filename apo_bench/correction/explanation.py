@@ -271,8 +271,8 @@ def _standing(assembly: Assembly, start: Poses, poses: Array, B: Array, spans: A
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), poses])
     explained = []
     for part in last:
-        # The part's twist is a sum over poses, so spans of all poses go through it together. `unit` is how far each
-        # component was observed to deviate: directions are distinguished from rounding in that unit.
+        # The twist of the part is a sum over poses, so its factor `moved` is the sum over all poses. `unit` is the
+        # standard deviation of each component as observed: directions are told from rounding in that unit.
         reach = _reach(words[part], stack, len(assembly.solids), len(poses))
         moved = reach.reshape(6, -1) @ spans.reshape(reach[0].size, -1)
         unit = np.sqrt(np.square(np.swapaxes(reach, 0, 1) @ B).sum(axis=(0, 2)))[:, None]

@@ -141,6 +141,7 @@ def _intersect(laid: Sequence[FacePair]) -> _Common:
     T_faces = np.array([each.T_face for each in laid]).reshape(-1, 4, 4)
     T = np.array([_into_plane(each.on) for each in laid]).reshape(-1, 4, 4) @ (pose.inverse(T_ons) @ T_faces)
     normals = np.array([each.face.normal for each in laid]).reshape(-1, 3)
+    # Row 2 of T times the normal is the cosine between the two normals.
     seen = (np.abs((T[:, 2, :3] * normals).sum(axis=1)) >= _EDGE_ON).nonzero()[0]
     shapes = np.full(len(laid), None, dtype=object)
     lower = np.array([flatten_face(laid[i].on) for i in seen], dtype=object)
@@ -161,6 +162,7 @@ def _project(faces: Sequence[Face], T: Array) -> NDArray[np.object_]:
     owner = np.repeat(np.arange(len(faces)), [len(points) for points, _ in rings])
     T = T[owner]
     flat = (T[:, :2, :3] @ points[:, :, None])[:, :, 0] + T[:, :2, 3]
+    # For shapely: the number of the ring of each point, and the number of the face of each ring.
     sizes = [sizes for _, sizes in rings]
     ring = np.repeat(np.arange(sum(map(len, sizes))), [size for of in sizes for size in of])
     of_face = np.repeat(np.arange(len(faces)), [len(of) for of in sizes])

@@ -32,7 +32,8 @@ def _adjoints() -> Array:
 def _series() -> Array:
     """Coefficients of X^2 and X^3 in exp(X), and of ad, .., ad^4 in J_r, by powers of the squared angle q, (TERMS, 6).
 
-    With x = -q: X^4 = x X^2, and odd powers of ad are ad^(2k+1) = k x^(k-1) ad^3 - (k-1) x^k ad, so do even ones.
+    With x = -q: X^4 = x X^2, and odd powers of ad are ad^(2k+1) = k x^(k-1) ad^3 - (k-1) x^k ad. Even powers follow
+    from these by multiplying by ad.
     """
     C = np.zeros((_TERMS, 6))
     for k in range(_TERMS):

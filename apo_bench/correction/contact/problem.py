@@ -170,7 +170,7 @@ def problem_of(observations: Sequence[Observation], level: float = TEST_LEVEL, a
         at: Poses, (b, n, 4, 4), at which vertices are projected and the solver starts; None: the observed poses.
 
     Raises:
-        InputError: A covariance is not positive definite; several operations share errors.
+        InputError: A covariance is not positive definite, or shared errors exceed the covariances that contain them.
     """
     first = observations[0]
     assembly = first.assembly
