@@ -77,7 +77,11 @@ def stream_key(seed: int, which: int, secret_seed: SecretSeed | None = None) -> 
 
 
 def simulate_demonstration(
-    scene: Scene, human_error_scale: float, seed: int, pose_source: str = "noise", secret_seed: SecretSeed | None = None
+    scene: Scene,
+    human_error_scale: float,
+    seed: int,
+    pose_source: str = TrialConfig.pose_source,
+    secret_seed: SecretSeed | None = None,
 ) -> SimulatedDemonstration:
     """Draw the layout of a trial and simulate the demonstration on it; `depth-camera` as pose source records images."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, secret_seed), scene.clearance_mm)

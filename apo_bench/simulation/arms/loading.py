@@ -49,8 +49,7 @@ def load_model(path: Path, kind: str) -> Any:
     for plural in _NAMED:
         for i, each in enumerate(getattr(spec, plural)):
             if not each.name:
-                # Singular without the final s, such as `joint_3`.
-                each.name = f"{plural[:-1]}_{i}"
+                each.name = f"{'body' if plural == 'bodies' else plural[:-1]}_{i}"  # such as `joint_3`
     return spec
 
 

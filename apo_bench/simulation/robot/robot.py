@@ -113,7 +113,6 @@ class Robot:
         # Commanded joint angles, and the tip pose to which they lead without errors.
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
-        self._rest = self.T
         self._fingers = fingers_of(model, self.arm)
         self.data: Any = make_initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.q + self._off
