@@ -1,4 +1,4 @@
-"""Import parts and assemblies from Python, as the commands `part import` and `assembly import` do."""
+"""Import CAD files by a Python call: `import_part` and `import_assembly`, as the commands of these names do."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Trial numbers for evaluation and for training."""
+"""Ranges of trial numbers, which are seeds: evaluation and training use ranges that do not overlap."""
 
 FIRST_TRAINING_TRIAL = 1_000_000
 """First number of trials for training, as in `dataset make` and the pool of `APOInsert-v0`.

@@ -1,4 +1,4 @@
-"""Search the free directions of a plan for the nearest target poses at which the plan fits.
+"""Search the free directions of a plan for the nearest target poses at which no failure is predicted: the plan fits.
 
 Free directions are the null space of the contact equations at the target poses. They are scaled by standard deviations
 of the observation, so a shorter vector is a likelier plan. Failures are linearised, and the shortest vector that

@@ -28,9 +28,11 @@ _ERRORS = tuple(field.name for field in fields(RobotError))
 
 
 def stack_errors(errors: Sequence[RobotError]) -> RobotError:
-    """Several robots as one, for `brought`: every array gets a leading axis r; `in_hand` keeps the operation first."""
+    """Stack the errors of r robots, so that `brought` computes the poses of all robots in one call.
+
+    Every array gets a leading axis r, except `in_hand`, which becomes (operations, r, 4, 4).
+    """
     hand_eye, joints, tool, in_hand = (np.array([getattr(each, name) for each in errors]) for name in _ERRORS)
-    # (operations, r, 4, 4), so that in_hand[k] is of all robots.
     return RobotError(hand_eye, joints, tool, in_hand.swapaxes(0, 1))
 
 

@@ -189,7 +189,7 @@ def draw_pairs(
         scenarios: Names, files or objects, one or several.
         noise: Noise model, as in `make_noise`.
         n: Number of pairs.
-        seed: From 0. No layout and no error of it is one of a trial of a sweep or a track.
+        seed: From 0. Whatever the seed, no pair shares its layout or its errors with a trial of a sweep or a track.
         noise_level: Standard deviation in mm and degrees, one number for both or a pair.
         human_error_scale: 0 for a human without error, 1 for the error that the scenario states.
 

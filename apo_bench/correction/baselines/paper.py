@@ -1,4 +1,4 @@
-"""The corrector `paper`: the method of the paper on the whole graph after the whole demonstration (Section 3.3)."""
+"""The corrector `paper`: the method of Suehiro and Ikeuchi, on all operations after the demonstration (Section 3.3)."""
 
 from apo_bench.assembly import Correction, Observation, build_contact_equations, find_largest_residual
 from apo_bench.correction.baselines.candidates import candidates

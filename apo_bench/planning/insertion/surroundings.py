@@ -34,7 +34,7 @@ def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tupl
     for macro in arrival.macros:
         if macro.name == "slide-to-contact":
             first = arrival.touched[macro.makes[0]]
-            side = -_now(assembly, arrival, macro.makes[0], poses)
+            side = -_touched_normal(assembly, arrival, macro.makes[0], poses)
             # A slanted slide keeps the planned direction in the frame of the part.
             if first.normal @ macro.direction > -1.0 + _STRAIGHT:
                 side = poses[arrival.main][:3, :3] @ arrival.own(macro.direction)
@@ -43,15 +43,13 @@ def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tupl
     return tuple(sides)
 
 
-def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
+def _touched_normal(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
     """The normal of touched contact i, (3,), world frame, at the assumed poses."""
-    contact = arrival.touched[i].contact
-    rests = arrival.touched[i].rests
+    contact, resting_part = arrival.touched[i].contact, arrival.touched[i].rests
     # A round contact has several normals: the position of contact i among those.
-    place = sum(each.contact == contact for each in arrival.touched[:i])
-    return find_touched_contacts(assembly, [contact], [of.part for of in contact if of.part != rests], poses)[
-        place
-    ].normal
+    position = sum(each.contact == contact for each in arrival.touched[:i])
+    moved = [face.part for face in contact if face.part != resting_part]
+    return find_touched_contacts(assembly, [contact], moved, poses)[position].normal
 
 
 def _walls(arrival: Arrival) -> tuple[Contact, ...]:

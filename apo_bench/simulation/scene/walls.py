@@ -2,8 +2,9 @@
 
 A hole consists of many wedges, each of which may reach to the outside of the part. A part on a table would touch it
 with every wedge, at four points each. So each wedge is cut into the wall and the material behind it, which is joined to
-few pieces. Walls stand back behind flat faces by less than a round wall deviates from its circle. So does the material
-behind where other pieces carry a face. Two neighbouring walls are joined if their common side, tangent to the circle in
+few pieces. Walls end slightly below the flat faces around the hole, by less than a round wall deviates from its circle,
+so that what rests on such a face touches other pieces. Material behind the walls also ends there, where other pieces
+form the face. Two neighbouring walls are joined if their common side, tangent to the circle in
 the middle, is near enough to the circle at its ends. The hole nowhere becomes narrower.
 """
 
