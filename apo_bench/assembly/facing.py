@@ -9,9 +9,12 @@ from apo_bench.assembly.facing_round import FacingPair, find_round_pairs, measur
 from apo_bench.geometry import (
     Array,
     Face,
+    FacePair,
+    Overlap,
     RoundFace,
     Solid,
     compute_overlap,
+    compute_overlaps,
     find_direction_across,
     measure_ball_distance,
     measure_face_area,
@@ -55,15 +58,19 @@ def facing(
         return
     posed_a = _pose_faces(a, T_a)
     posed_b = _pose_faces(b, T_b)
+    near = []
     for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
         if (posed_a.faces[i].name, posed_b.faces[j].name) in known:
             continue
         heights = (posed_a.corners[i] - posed_b.corners[j][0]) @ posed_b.normals[j]
-        if heights.min() > gap_m or heights.max() < -gap_m:
-            continue
-        pair = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
-        if pair is not None and abs(pair.gap_m) <= gap_m:
-            yield pair
+        if heights.min() <= gap_m and heights.max() >= -gap_m:
+            near.append((i, j))
+    if near:
+        overlaps = compute_overlaps([FacePair(posed_a.faces[i], T_a, posed_b.faces[j], T_b) for i, j in near])
+        for (i, j), common in zip(near, overlaps, strict=True):
+            pair = _pair(posed_a, i, posed_b, j, T_b, common, share)
+            if pair is not None and abs(pair.gap_m) <= gap_m:
+                yield pair
     for face, other in find_round_pairs(a, b):
         if (face.name, other.name) not in known:
             measured = measure_round(face, T_a, other, T_b)
@@ -100,13 +107,17 @@ def _pose_faces(solid: Solid, T: Array) -> _Posed:
     return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])
 
 
-def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> FacingPair | None:
-    """Measure face i of one solid against face j of another; None if they cover too little of each other."""
+def _pair(a: _Posed, i: int, b: _Posed, j: int, T_b: Array, common: Overlap, share: float) -> FacingPair | None:
+    """Measure face i of one solid against face j of another; None if they cover too little of each other.
+
+    Args:
+        T_b: World pose of the second solid, (4, 4), [m].
+        common: The overlap of the two faces.
+    """
     face_a = a.faces[i]
     face_b = b.faces[j]
     n_a = a.normals[i]
     n_b = b.normals[j]
-    common = compute_overlap(face_a, T_a, face_b, T_b)
     covered = common.area / min(measure_face_area(face_a), measure_face_area(face_b))
     if covered < share or not len(common.corners):
         return None
