@@ -1,13 +1,13 @@
 """Compute how an arm would execute a plan (`ArmMove`), for failure prediction."""
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
-from apo_bench.planning.prediction.measures import ArmMove
+from apo_bench.planning.prediction.measures import ArmMove, Refused
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
@@ -24,8 +24,6 @@ from apo_bench.simulation.robot import list_gripper_boxes
 from apo_bench.simulation.scene import Scene
 
 _AT_LIMIT_RAD = np.radians(0.5)  # a joint nearer to its limit counts as at the limit
-
-_Refused = Literal["unreachable_start", "unreachable"]
 
 
 def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, ...]:
@@ -60,7 +58,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     t = move.transfer
     code, path, ended = solve_key_angles(t, scene)
     if code:
-        return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
+        return ArmMove(step.operation, step.undo, cast(Refused, code), _at_limit(scene, ended))
     if scene.arm.hand is None:  # without a gripper file only reach is predicted
         return ArmMove(step.operation, step.undo)
     T_tip = scene.kinematics.forward(path[-1])  # at the goal
