@@ -62,7 +62,7 @@ def draw(folder: Path, scenario: str, episodes: int) -> None:
         takes_over = len(read) + int(rng.integers(HORIZON * 3 // 2))
         over = False
         while not over:
-            read.append(student.told(observation))
+            read.append(student.encode(observation))
             taught.append(np.clip(expert(env, observation), -1.0, 1.0))
             action = taught[-1] if len(read) > takes_over else student.act(observation, read[-1])
             observation, _, terminated, truncated, info = env.step(np.asarray(action, np.float32))

@@ -58,22 +58,22 @@ class DaggerInsert:
         self._there: Array | None = None  # moving average of the target, (6,), in units of an action
 
     def __call__(self, env: Any, seen: dict[str, Any]) -> Array:
-        return self.act(seen, self.told(seen))
+        return self.act(seen, self.encode(seen))
 
-    def act(self, seen: dict[str, Any], told: Array) -> Array:
+    def act(self, seen: dict[str, Any], inputs: Array) -> Array:
         """Return an action, (7,), across the axis and in rotation, towards the averaged target.
 
         Args:
-            told: Inputs of the network, of `told`.
+            inputs: Inputs of the network, of `encode`.
         """
         at = seen["agent_pos"][:6] / _UNIT
-        there = at + wanted(self._weights, told) / _GAIN  # the network predicts the gain times the error
+        there = at + predict_error(self._weights, inputs) / _GAIN  # the network predicts the gain times the error
         self._there = there if self._there is None else self._there + SLOWLY * (there - self._there)
         aside = np.clip(_GAIN * (self._there - at), -1.0, 1.0)
         aside[2] = 0.0  # the scripted approach moves along the axis
         return np.append(aside, 0.0)
 
-    def told(self, seen: dict[str, Any]) -> Array:
+    def encode(self, seen: dict[str, Any]) -> Array:
         """Return the inputs of the network, (VECTORS + 10,), and update the history.
 
         The inputs are the scaled vectors of the last observations, newest first, then the push, then single numbers.
@@ -96,18 +96,18 @@ class DaggerInsert:
         return np.concatenate([*self._past, np.clip(push / _VECTORS[2], -9.0, 9.0), np.arcsinh(numbers / _NUMBERS)])
 
 
-def wanted(weights: dict[str, Array], told: Array) -> Array:
+def predict_error(weights: dict[str, Array], inputs: Array) -> Array:
     """Return the network's estimate of the teacher's action, (6,), averaged over the four mirror images.
 
     The signs of `MIRRORS` map each output back, so the policy is symmetric.
     """
-    return np.asarray(np.mean(forward(weights, mirrored(told)) * MIRRORS, axis=0))
+    return np.asarray(np.mean(forward(weights, mirror_inputs(inputs)) * MIRRORS, axis=0))
 
 
-def mirrored(told: Array) -> Array:
+def mirror_inputs(inputs: Array) -> Array:
     """Return the inputs in the four mirror images, (4, ...); single numbers do not change."""
     signs = np.tile(MIRRORS, (1, VECTORS // 6))
-    return np.concatenate([told[:VECTORS] * signs, np.tile(told[VECTORS:], (len(MIRRORS), 1))], axis=1)
+    return np.concatenate([inputs[:VECTORS] * signs, np.tile(inputs[VECTORS:], (len(MIRRORS), 1))], axis=1)
 
 
 def forward(weights: dict[str, Array], x: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.envs.dagger_insert import MIRRORS, SHAPES, DaggerInsert, forward, mirrored, wanted
+from apo_bench.envs.dagger_insert import MIRRORS, SHAPES, DaggerInsert, forward, mirror_inputs, predict_error
 from apo_bench.envs.policies import POLICIES
 from apo_bench.names import resolve
 from apo_bench.resources import folder
@@ -46,14 +46,14 @@ def test_it_goes_to_the_mean_place_that_the_network_said() -> None:
     """At the first sight it does what is said; after it, a single word of the network weighs a tenth."""
     student = DaggerInsert(WEIGHTS)
     seen = sight()
-    told = student.told(seen)
+    inputs = student.encode(seen)
     across = [0, 1, 3, 4, 5]
-    said = np.clip(wanted(WEIGHTS, told), -1.0, 1.0)
-    assert student.act(seen, told)[across] == pytest.approx(said[across])
-    other = student.told(sight())
-    mixed = 0.9 * wanted(WEIGHTS, told) + 0.1 * wanted(WEIGHTS, other)
+    said = np.clip(predict_error(WEIGHTS, inputs), -1.0, 1.0)
+    assert student.act(seen, inputs)[across] == pytest.approx(said[across])
+    other = student.encode(sight())
+    mixed = 0.9 * predict_error(WEIGHTS, inputs) + 0.1 * predict_error(WEIGHTS, other)
     assert student.act(seen, other)[across] == pytest.approx(np.clip(mixed, -1.0, 1.0)[across])
-    assert forward(WEIGHTS, mirrored(told)).shape == (4, 6)
+    assert forward(WEIGHTS, mirror_inputs(inputs)).shape == (4, 6)
 
 
 def test_weights_are_small_and_come_along() -> None:
