@@ -150,12 +150,10 @@ def test_a_driver_that_is_stopped_goes_on_later(cluster: Any, here: list[bytes],
     process.send_signal(signal.SIGTERM)
     printed = process.communicate(timeout=60)
     assert process.returncode == 143
-    # on a slow machine Ray says on standard output that a node answers late
-    ours = [line for stream in printed for line in stream.splitlines() if "(raylet)" not in line]
-    assert ours == [
-        "0 of 20 trials",
-        "apo-bench: ended by SIGTERM; the trials that ended are kept, and the same command continues.",
-    ]
+    # on a slow machine Ray adds lines of its own, on either stream
+    shown = "\n".join(printed)
+    assert "0 of 20 trials" in shown and "Traceback" not in shown
+    assert "apo-bench: ended by SIGTERM; the trials that ended are kept, and the same command continues." in shown
     assert 2 <= len(lines(out)) < len(here)
     run_sweep(SPEC, out, backend="ray", address=cluster.address)
     assert lines(out) == here
