@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast, final
 
+import numpy as np
+
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Plan
 from apo_bench.correction.calibration import UNKNOWN, compute_slip_sigmas, make_prior_estimate
@@ -292,8 +294,9 @@ def probing_config(
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if assumed is None else parse_robot_error(assumed)
-    estimate = make_prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions)
+    middle = plan.target_poses[:, :3, 3].mean(axis=0)
+    estimate = make_prior_estimate(sigmas, len(scene.arm.joints), middle, np.array(scene.arm.base), sigmas.sag_mm > 0.0)
+    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions, 0.5e-3 * sigmas.finger_mm)
 
 
 def record_trial(

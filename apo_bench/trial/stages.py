@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -29,7 +29,7 @@ from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution import DEFAULT_EXECUTION, ExecutionConfig, ReplayCache, replay
 from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.robot import RobotError, compute_sag_per_metre
 from apo_bench.simulation.scene import Scene, build_scene
 
 if TYPE_CHECKING:
@@ -39,11 +39,14 @@ if TYPE_CHECKING:
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE, TV, REOBSERVE, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(
     12
 )
+SAG, BASE_TILT, FINGER, FT_DRIFT = range(12, 16)
 """Random streams of a trial, one per source of randomness; renumbering them changes all trials.
 
-`ARM` is reserved. `HAND_EYE`, `JOINTS`, `TOOL` and `IN_HAND` are the errors of the robot, `WRENCH` is the noise of its
-force-torque sensor.
+`ARM` is reserved. `WRENCH` is the noise of the force-torque sensor. The others from `HAND_EYE` on are the errors of the
+robot.
 """
+_DRIFT_NM = 0.05
+"""Drift of the torque of a force-torque sensor for 1 N of its force, [Nm]."""
 
 
 @final
@@ -211,12 +214,13 @@ def draw_robot_error(name: str, scene: Scene, seed: int, secret_seed: SecretSeed
 def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...]], Array]) -> RobotError:
     """Scale standard normal numbers to robot errors.
 
-    The base is rotated about the mean of the nominal target poses. A part slips along the pads (second and third axis
-    of the tip) and rotates about their normal (first axis).
+    The hand-eye error rotates about the mean of the nominal target poses, the tilt about the foot of the robot. A part
+    slips along the pads (second and third axis of the tip) and rotates about their normal (first axis). An arm never
+    sags upwards.
 
     Args:
         name: Standard deviations, as in a record.
-        drawn: (stream, shape) -> standard normal numbers; streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
+        drawn: (stream, shape) -> standard normal numbers; streams from `HAND_EYE` on, except `WRENCH`.
     """
     sigmas = parse_robot_error(name)
     shift, turn = drawn(HAND_EYE, (2, 3))
@@ -226,13 +230,26 @@ def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...
     # turned about the middle of the goals: E becomes T_m E T_m^-1
     if sigmas.hand_eye != (0.0, 0.0):
         hand_eye = middle @ hand_eye @ pose.inverse(middle)
+    if sigmas.base_tilt_deg:
+        foot = pose.at(scene.arm.base)
+        tilt = pose.at((0.0, 0.0, 0.0), (*(sigmas.base_tilt_deg * drawn(BASE_TILT, (2,))), 0.0))
+        hand_eye = hand_eye @ foot @ tilt @ pose.inverse(foot)
     joints = np.radians(sigmas.joints_deg) * drawn(JOINTS, (len(scene.arm.joints),))
     tool = pose.at(1e-3 * sigmas.tool_mm * drawn(TOOL, (3,)), (0.0, 0.0, 0.0))
     m = 1e-3 * sigmas.in_hand[0]
     deg = sigmas.in_hand[1]
     slips = drawn(IN_HAND, (len(scene.scenario.assembly), 3))
     in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
-    return RobotError(hand_eye, joints, tool, in_hand)
+    error = RobotError(hand_eye, joints, tool, in_hand)
+    if sigmas.sag_mm:
+        size = 1e-3 * sigmas.sag_mm * abs(drawn(SAG, (1,)))
+        error = replace(error, sag=size * compute_sag_per_metre(scene))
+    if sigmas.finger_mm:
+        error = replace(error, finger=1e-3 * sigmas.finger_mm * float(drawn(FINGER, (1,))[0]))
+    if sigmas.ft_drift_n:
+        size = sigmas.ft_drift_n / 60.0 * np.repeat([1.0, _DRIFT_NM], 3)
+        error = replace(error, ft_drift=size * drawn(FT_DRIFT, (6,)))
+    return error
 
 
 def replay_and_judge(

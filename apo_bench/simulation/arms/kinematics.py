@@ -101,6 +101,16 @@ class Kinematics:
         self.forward(q)
         return self._jacobian()[:, self.model.jnt_dofadr[self.ids]]
 
+    def gravity_torque(self, q: Array) -> Array:
+        """The torque of each joint that carries the weight of the arm with its hand at rest, (joints,), [N m]."""
+        self.forward(q)
+        data = self.configuration.data
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_comVel(self.model, data)
+        torque = np.zeros(self.model.nv)
+        mujoco.mj_rne(self.model, data, 0, torque)
+        return torque[self.model.jnt_dofadr[self.ids]]
+
     def inverse_jacobian(self, q: Array) -> Array:
         """The pseudoinverse of the Jacobian, (joints, 6): joint rotations, [rad], per twist of the tip, in its frame.
 

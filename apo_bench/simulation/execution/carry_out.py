@@ -222,6 +222,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.follow(smooth_trajectory(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
+    robot.level()
     robot.slip_monitor = robot.slip_monitor.carry(robot.in_hand())
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:

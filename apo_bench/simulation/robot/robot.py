@@ -40,6 +40,11 @@ from apo_bench.simulation.scene import (
 
 _REST_RAD_S = 2e-3  # joint speed below which the arm is at rest
 _REST_M_S = 3e-3  # finger speed below which the fingers are at rest
+_LAG_M = 1e-4
+"""Distance of the resting tip from its command above which `level` corrects it; a compensated arm with a part in its
+hand is within 0.04 mm."""
+_LEVEL_S = 0.2  # duration of this correction
+_SAG_STEPS = 25  # physics steps between two poses for which the sag of the joints is computed
 
 
 class ExecutionAborted(Exception):
@@ -95,8 +100,12 @@ class Robot:
         self._error = error
         # True minus measured joint angles.
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
+        # Compliance of the joints behind the encoders, [rad/(N m)].
+        self._sag: Array = np.zeros(1) if error is None else error.sag
+        # Commands less measured joint angles at rest, for which the commands compensate.
+        self._droop: Array = np.zeros(len(scene.arm.joints))
         # The search for near parts uses the estimated tip, so with joint errors no step is skipped.
-        self.fidelity = "full" if self._off.any() else fidelity
+        self.fidelity = "full" if self._off.any() or self._sag.any() else fidelity
         self._carried: Carried | None = None
         model = self.model
         joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
@@ -115,11 +124,11 @@ class Robot:
         self.T: Array = scene.kinematics.forward(self.q)
         self._fingers = fingers_of(model, self.arm)
         self.data: Any = make_initial_state(scene.work, start)
-        self.data.qpos[self._qpos] = self.q + self._off
+        self.data.qpos[self._qpos] = self._true(self.q[None])[0]
         self._fingers.put(self.data, self.arm.opening_m)
         self.data.ctrl[:] = 0.0
         mujoco.mj_forward(model, self.data)
-        self.data.ctrl[self._drives] = self.q + self._off
+        self.data.ctrl[self._drives] = self._true(self.q[None])[0]
         self._fingers.command(self.data, self.arm.opening_m)
         self.forces = ForceSensors(scene.work, self.data.sensordata)
 
@@ -195,7 +204,7 @@ class Robot:
             The contact force on the held part, (3,), world, [N].
         """
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
-        self.data.ctrl[self._drives] = to + self._off
+        self.data.ctrl[self._drives] = self._true(to[None])[0] + self._droop
         mujoco.mj_step(self.model, self.data)
         self.forces.take(self.forces.sensors[None], self.step_s)
         if passed % self._steps_of_tick == 0:
@@ -250,10 +259,31 @@ class Robot:
                 break
         fingers.command(self.data, to)
 
+    def level(self) -> None:
+        """Raise the resting arm to its command if its encoders show that it hangs lower; it must touch nothing.
+
+        Servos yield to a weight that is not compensated. From now on the commands include the difference, so that after
+        a guarded stop, too, the arm carries its weight instead of resting it on what it touches.
+        """
+        lag = self.q - self.encoders()
+        off = self.scene.kinematics.forward(self.q - lag)[:3, 3] - self.T[:3, 3]
+        if not self._droop.any() and np.linalg.norm(off) < _LAG_M:
+            return
+        steps = round(_LEVEL_S / self.step_s)
+        self._run(self.q + np.linspace(0.0, 1.0, steps)[:, None] * lag, None)
+        self._droop = self._droop + lag
+        self.stand()
+
     def _rests(self) -> bool:
         """Whether the joints and the fingers are at rest."""
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
+
+    @property
+    def ft_drift(self) -> Callable[[], Array] | None:
+        """Returns how far the offset of the force-torque sensor has drifted by now, (6,); None: it does not drift."""
+        error = self._error
+        return None if error is None or not error.ft_drift.any() else lambda: error.ft_drift * self.data.time
 
     def opening(self) -> float:
         """Return the measured opening of each finger, [m]."""
@@ -261,7 +291,10 @@ class Robot:
 
     def encoders(self) -> Array:
         """Return the measured joint angles, (joints,), [rad]; they contain the joint errors."""
-        return np.asarray(self.data.qpos[self._qpos] - self._off)
+        measured = self.data.qpos[self._qpos] - self._off
+        if self._sag.any():
+            measured = measured + self._sag * self.scene.kinematics.gravity_torque(measured)
+        return np.asarray(measured)
 
     def tip(self) -> Array:
         """Return the pose of the tip by the true joint angles, (4, 4), world."""
@@ -269,11 +302,11 @@ class Robot:
 
     def memory(self) -> tuple[Any, ...]:
         """Return the state of the controller, without that of the physics, for `remember`."""
-        return self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
+        return self.q, self.T, self._droop, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
 
     def remember(self, memory: tuple[Any, ...]) -> None:
         """Restore the state that `memory` returned; the caller restores that of the physics."""
-        self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, forces = memory
+        self.q, self.T, self._droop, self.stage, self.left_out_s, self.slip_monitor, forces = memory
         self.forces.remember(forces)
 
     def in_hand(self) -> Array:
@@ -292,10 +325,11 @@ class Robot:
             mujoco.mj_forward(self.model, self.data)
             weld(self.scene, self.data, held[0], True)
 
-    def compensate(self, off: Array) -> None:
-        """Replace the joint errors, (joints,), [rad]: true minus measured angles, after calibration."""
+    def compensate(self, off: Array, sag: Array) -> None:
+        """Replace the joint errors, (joints,), [rad]: true minus measured angles, and the sag, after calibration."""
         self._off = off
-        if off.any():
+        self._sag = sag
+        if off.any() or sag.any():
             self.fidelity = "full"
 
     def steady(self, on: bool) -> None:
@@ -334,8 +368,18 @@ class Robot:
         The joint errors are added, since MuJoCo's servos act on true angles. The fingers keep their command.
         """
         commands = np.repeat(self.data.ctrl[None], len(targets), axis=0)
-        commands[:, self._drives] = targets + self._off
+        commands[:, self._drives] = self._true(targets) + self._droop
         return commands
+
+    def _true(self, q: Array) -> Array:
+        """Return the true joint angles at measured ones, (n, joints) at successive physics steps, [rad]."""
+        if not self._sag.any():
+            return np.asarray(q + self._off)
+        n = len(q)
+        at = np.unique(np.append(np.arange(0, n, _SAG_STEPS), n - 1))
+        torque = np.array([self.scene.kinematics.gravity_torque(q[i]) for i in at])
+        between = [np.interp(np.arange(n), at, of_joint) for of_joint in torque.T]
+        return np.asarray(q + self._off - self._sag * np.transpose(between))
 
     def _run(self, targets: Array, guard: Guard | None) -> int:
         """Command joint targets, (n, joints), one for each physics step, until a guard stops the motion.

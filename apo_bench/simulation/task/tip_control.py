@@ -80,7 +80,7 @@ class TipControl:
         self.arrived = False
         """Whether the approach is over, so that the part would be released."""
         self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
-        robot.compensate(start.off)
+        robot.compensate(start.off, start.sag)
         restore_state(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
