@@ -279,11 +279,9 @@ class Robot:
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
 
-    @property
-    def ft_drift(self) -> Callable[[], Array] | None:
-        """Returns how far the offset of the force-torque sensor has drifted by now, (6,); None: it does not drift."""
-        error = self._error
-        return None if error is None or not error.ft_drift.any() else lambda: error.ft_drift * self.data.time
+    def ft_drift(self) -> Array:
+        """Return how far the force-torque sensor has drifted by now, (6,) or (1,) if it does not, [N] and [Nm]."""
+        return np.zeros(1) if self._error is None else self._error.ft_drift * self.data.time
 
     def opening(self) -> float:
         """Return the measured opening of each finger, [m]."""

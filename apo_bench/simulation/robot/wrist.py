@@ -83,6 +83,11 @@ def filter_noise(noise: FtNoise, part: float) -> FtNoise:
     return FtNoise(left * noise.force_n, left * noise.torque_nm)
 
 
+def _no_drift() -> Array:
+    """Return the drift of a sensor that does not drift."""
+    return np.zeros(1)
+
+
 @final
 class WristSensor:
     """The sensor at the wrist of one arm during one replay."""
@@ -95,7 +100,7 @@ class WristSensor:
         noise: FtNoise,
         rng: np.random.Generator,
         bandwidth_hz: float = BANDWIDTH_HZ,
-        drift: Callable[[], Array] | None = None,
+        drift: Callable[[], Array] = _no_drift,
     ) -> None:
         """Draw the offset of the trial.
 
@@ -106,7 +111,7 @@ class WristSensor:
             noise: Standard deviations of a reading, per axis.
             rng: Source of six numbers now and six at each reading.
             bandwidth_hz: Cutoff frequency of the low pass.
-            drift: Returns how far the offset has drifted, (6,), [N] and [Nm]; None: it does not.
+            drift: Returns how far the offset has drifted, (6,), [N] and [Nm].
         """
         first = [int(scene.work.model.sensor_adr[scene.work.model.sensor(name).id]) for name in WRIST_SENSORS]
         self._raw_at = first[0]
@@ -167,9 +172,8 @@ class WristSensor:
         self._clock_s += step_s
         if self._clock_s < READING_S - _ROUNDING_S:
             return False
-        reading = self._sum / self._summed_s + self._offset + self._sigma * self._rng.standard_normal(6)
-        if self._drift is not None:
-            reading += self._drift()
+        offset = self._offset + self._drift()
+        reading = self._sum / self._summed_s + offset + self._sigma * self._rng.standard_normal(6)
         self._sum[:] = 0.0
         self._summed_s = 0.0
         self._clock_s -= READING_S
@@ -179,7 +183,7 @@ class WristSensor:
         return True
 
     def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
-        """Return a copy, with the same offset and tare, for another simulation of its robot and other noise.
+        """Return a copy, with the same offset and tare but no drift, for another simulation of its robot.
 
         Args:
             sensordata, encoders, rng: As for the constructor.
@@ -188,9 +192,8 @@ class WristSensor:
         other._raw = sensordata[self._raw_at : self._raw_at + 6]
         other._encoders = encoders
         other._rng = rng
-        if self._drift is not None:  # it does not drift during an episode
-            other._offset = self._offset + self._drift()
-            other._drift = None
+        other._offset = self._offset + self._drift()
+        other._drift = _no_drift
         other.begin(self._hand)
         return other
 
