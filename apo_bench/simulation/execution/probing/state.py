@@ -102,11 +102,16 @@ class ProbingState:
         n = back[:3, :3] @ normal
         return n, float(n @ (back[:3, :3] @ point + back[:3, 3]))
 
-    def estimated_tip(self, robot: Robot) -> Array:
-        """Return the tip pose that the robot would estimate from its encoders without compensation, (4, 4), world."""
+    def estimated_tip(self, robot: Robot, holds: bool) -> Array:
+        """Return the tip pose that the robot would estimate from its encoders without compensation, (4, 4), world.
+
+        Args:
+            holds: Whether the middle between the pads, which hold a part or touch themselves, stands for the tip.
+        """
         left = self.residual
+        hand = left.pads if holds else left.tool
         measured = self._kinematics.forward(robot.encoders())
-        corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)
+        corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(hand)
         return self.estimate.command(corrected, self.jacobian(robot))
 
     def jacobian(self, robot: Robot) -> Array:
@@ -207,7 +212,7 @@ class ProbingState:
         """
         J = self.jacobian(robot)
         grasp, T_tip_part = held or (None, None)
-        return Touch(self.estimated_tip(robot), normal, offset, point, sigma_m, J, grasp, T_tip_part)
+        return Touch(self.estimated_tip(robot, held is not None), normal, offset, point, sigma_m, J, grasp, T_tip_part)
 
 
 def _less_common(estimate: CalibrationEstimate, touches: Sequence[Touch]) -> list[Touch]:
