@@ -126,7 +126,13 @@ def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
     pairs = [
         (each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__), each) for each in several
     ]
-    return [(f"{kind}_{i}" if label == "<lambda>" else label, each) for i, (label, each) in enumerate(pairs, start=1)]
+    named = [(f"{kind}_{i}" if label == "<lambda>" else label, each) for i, (label, each) in enumerate(pairs, start=1)]
+    for label, each in named:
+        require(
+            dict(named)[label] is each or dict(named)[label] == each,
+            f"several functions are named '{label}'; give labels, as in {kind}={{'first': ..., 'second': ...}}.",
+        )
+    return named
 
 
 def _relabel(record: TrialRecord, labels: Mapping[str, str]) -> TrialRecord:

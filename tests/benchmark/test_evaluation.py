@@ -44,6 +44,14 @@ def test_the_error_of_a_method_stands_below_the_table() -> None:
     assert "(1, 4, 4)" in text.splitlines()[-1]
 
 
+def test_functions_of_one_name_need_labels() -> None:
+    functions = [lambda observation, k=k: observation.poses for k in range(2)]
+    for function in functions:
+        function.__name__ = "mine"
+    with pytest.raises(apo_bench.InputError, match="several functions are named 'mine'"):
+        apo_bench.evaluate(functions, scenario="block_on_block", **QUICK)
+
+
 def test_a_script_without_a_guard_is_told_about_it_once(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
