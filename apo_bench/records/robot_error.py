@@ -70,8 +70,8 @@ def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
         require_known(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS))
         require(kind not in sigmas, f"the {called} '{name}' was given, which has {kind} twice; state it once.")
         sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
-    given = {kind: sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS}
-    return Sigmas(*(given[kind] if len(units) == 2 else given[kind][0] for kind, units in _UNITS.items()))
+    hand_eye, joints, tool, in_hand, *others = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
+    return Sigmas(hand_eye, joints[0], tool[0], in_hand, *(size for size, _ in others))
 
 
 def normalise_robot_error(name: str) -> str:

@@ -96,6 +96,10 @@ class ForceSensors:
         net: list[float] = np.dot(self._net_of_sensors, self.sensors).tolist()
         return net
 
+    def external_n(self) -> float:
+        """Return the contact force on the held parts, or on the arm with an empty hand, [N]."""
+        return math.hypot(*self.net()) if self.held else float(np.linalg.norm(self._on_arm_flat))
+
     def push(self, guard: Guard) -> Array:
         """Return the weights, (sensors,), whose dot product with `sensors` is the force against a guard, [N]."""
         return np.asarray(-guard.direction @ self._net_of_sensors)

@@ -42,7 +42,8 @@ _REST_RAD_S = 2e-3  # joint speed below which the arm is at rest
 _REST_M_S = 3e-3  # finger speed below which the fingers are at rest
 _LAG_M = 1e-4
 """Distance of the resting tip from its command above which `level` corrects it; a compensated arm with a part in its
-hand is within 0.04 mm."""
+hand is within 0.02 mm."""
+_PUSHED_N = 0.5  # external force above which contact may hold the arm off its command
 _LEVEL_S = 0.2  # duration of this correction
 _SAG_STEPS = 25  # physics steps between two poses for which the sag of the joints is computed
 
@@ -260,14 +261,15 @@ class Robot:
         fingers.command(self.data, to)
 
     def level(self) -> None:
-        """Raise the resting arm to its command if its encoders show that it hangs lower; it must touch nothing.
+        """Raise the resting arm to its command if its encoders show that it hangs lower, unless it touches something.
 
         Servos yield to a weight that is not compensated. From now on the commands include the difference, so that after
         a guarded stop, too, the arm carries its weight instead of resting it on what it touches.
         """
         lag = self.q - self.encoders()
         off = self.scene.kinematics.forward(self.q - lag)[:3, 3] - self.T[:3, 3]
-        if not self._droop.any() and np.linalg.norm(off) < _LAG_M:
+        hangs = self._droop.any() or np.linalg.norm(off) > _LAG_M
+        if not hangs or self.forces.external_n() > _PUSHED_N:
             return
         steps = round(_LEVEL_S / self.step_s)
         self._run(self.q + np.linspace(0.0, 1.0, steps)[:, None] * lag, None)
