@@ -81,7 +81,7 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     u = T_shaft[:3, :3] @ shaft.axis
     touch = measure_mate(shaft, T_shaft, flat, T_flat)
     middle = touch.points.mean(axis=0)
-    height = float(touch.off.mean(axis=0) @ n)
+    height = float(touch.offsets.mean(axis=0) @ n)
     # Of an axis through p along u over a plane n: d(n . p) = n . v + (p x n) . w, and d(n . u) = (u x n) . w.
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
@@ -106,7 +106,7 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
     u = u if u @ w > 0.0 else -u  # axes of cylinders have no sense
     across = (T_b[:3, :3] @ b.frame[:3, :2]).T
     p = touch.points.mean(axis=0)
-    off = across @ touch.off.mean(axis=0)
+    off = across @ touch.offsets.mean(axis=0)
     half = touch.length_m / 2
     return FacingPair(
         a=a.name,

@@ -14,7 +14,7 @@ from apo_bench.assembly import (
     find_touch_points,
     find_touched_contacts,
 )
-from apo_bench.geometry import Array, Solid, find_least_turned, pose
+from apo_bench.geometry import Array, Solid, find_least_rotated_pose, pose
 
 _ONE_WAY = 0.999
 """Faces whose normals have at least this cosine are parallel: together they are a plain support."""
@@ -48,7 +48,7 @@ def displacements(assembly: Assembly, reached: ReachedState, away: Collection[st
         if put is not None and part not in away:
             solid = assembly.solids[part]
             at = _corners(solid)
-            T = find_least_turned(solid, reached.final.poses[part], put.poses[part])
+            T = find_least_rotated_pose(solid, reached.final.poses[part], put.poses[part])
             moved[part] = _farthest(pose.apply(T, at) - pose.apply(put.poses[part], at))
     return moved
 
@@ -130,8 +130,8 @@ def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, 
 def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
     """The pose `now` of b in the frame of a, with rotations about axes of revolution made nearest to `before`."""
     for _ in range(_PASSES):
-        now = find_least_turned(b, now, before)
-        now = pose.inverse(find_least_turned(a, pose.inverse(now), pose.inverse(before)))
+        now = find_least_rotated_pose(b, now, before)
+        now = pose.inverse(find_least_rotated_pose(a, pose.inverse(now), pose.inverse(before)))
     return now
 
 

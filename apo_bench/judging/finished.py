@@ -14,7 +14,7 @@ from apo_bench.assembly import (
     compute_placements,
     list_alternatives,
 )
-from apo_bench.geometry import Array, find_nearest_alike, remember
+from apo_bench.geometry import Array, find_nearest_equivalent_pose, remember
 from apo_bench.judging.contacts import ContactCase, ContactJudge, compute_covered_shares
 from apo_bench.judging.displaced import faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
@@ -119,6 +119,6 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
 def _as_meant(assembly: Assembly, poses: Poses, true: Poses) -> Poses:
     """Poses with each part rotated by its symmetry that is nearest to the truth, or to each of several truths."""
     return {
-        part: T if part in assembly.fixed else find_nearest_alike(assembly.solids[part], T, true[part])
+        part: T if part in assembly.fixed else find_nearest_equivalent_pose(assembly.solids[part], T, true[part])
         for part, T in poses.items()
     }

@@ -10,7 +10,7 @@ import numpy as np
 from shapely import Polygon
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Array, Face, RoundFace, Solid, measure_passage
+from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays
 from apo_bench.importers.cad.contact_faces import contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
@@ -209,6 +209,6 @@ def _free_radius(solid: Solid, wall: RoundFace) -> float:
     at = wall.point + (wall.span[0] + share * wall.length) * wall.axis
     nearest = np.inf
     for piece in solid.pieces:
-        enter, leave = measure_passage(piece.planes, at, out)
+        enter, leave = intersect_rays(piece.planes, at, out)
         nearest = min(nearest, np.maximum(enter, 0.0)[leave > 0.0].min(initial=np.inf))
     return float(nearest)

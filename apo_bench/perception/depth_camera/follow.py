@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import (
     Array,
-    find_least_turned,
+    find_least_rotated_pose,
     find_nearest_symmetric_pose,
     find_symmetries,
     pose,
@@ -105,7 +105,9 @@ def follow_demonstration(
             solid = assembly.solids[operation.main]
             # Of the poses that look the same, report the one nearest to the planned rotation.
             turn = frame @ expected.turns[which]
-            T = find_least_turned(solid, find_nearest_symmetric_pose(located.T, find_symmetries(solid), turn), turn)
+            T = find_least_rotated_pose(
+                solid, find_nearest_symmetric_pose(located.T, find_symmetries(solid), turn), turn
+            )
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
             located = LocatedModel(T, _turn_covariance(located, T), located.explained)

@@ -10,7 +10,7 @@ from math import exp, hypot, log, sqrt
 import numpy as np
 from scipy.special import log_ndtr, ndtr
 
-from apo_bench.geometry import Array, Overlap, compute_overlap, find_ways_out, measure_face_area, pose
+from apo_bench.geometry import Array, Overlap, compute_overlap, find_escapes, measure_face_area, pose
 from apo_bench.perception.detection.candidate import Candidate
 from apo_bench.perception.detection.situation import Situation
 from apo_bench.perception.detection.thresholds import Rules
@@ -75,7 +75,7 @@ def inside(at: Situation, rules: Rules, taken: Collection[Candidate], a: str, b:
     solids = at.seen.assembly.solids
     worst = 0.0
     mine = [c for c in taken if c.parts == (a, b)]
-    for directions, lengths, middle in find_ways_out(solids[a], at.now.poses[a], solids[b], at.now.poses[b], _SOFT_M):
+    for directions, lengths, middle in find_escapes(solids[a], at.now.poses[a], solids[b], at.now.poses[b], _SOFT_M):
         deviations = np.sqrt(at.variances(a, b, directions, middle) + _SOFT_M**2 + at.seen.play_m**2)
         worst = max(worst, _least_unlikely(at, rules, mine, directions, lengths, deviations))
     return worst

@@ -17,7 +17,7 @@ from apo_bench.assembly import (
     find_touched_contacts,
     measure_entrance_depth,
 )
-from apo_bench.geometry import Array, PosedPieces, compute_exit_distance, freeze, is_way_free, measure_extent
+from apo_bench.geometry import Array, PosedPieces, compute_exit_distance, freeze, is_path_free, measure_extent
 from apo_bench.planning.insertion.attach import ANY, Attach, Preference
 from apo_bench.planning.insertion.macros import UP, Chain, Macro, StraightExit, chain, departure
 from apo_bench.planning.insertion.states import (
@@ -133,12 +133,12 @@ def arrive(
     # In the helpers below `way` is the unit vector of an exit from the goal, world frame.
     def along_is_free(way: Array, length_m: float) -> bool:
         """Whether the moving parts can move along `way` by a length."""
-        return is_way_free(moving, way, length_m, list(resting.values()))
+        return is_path_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
         """Whether an exit is free, and then the space above its end, from where the part descends."""
         begin = [PosedPieces(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
-        return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
+        return along_is_free(way, length_m) and is_path_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
         """Length of the line for an exit distance, [m]."""

@@ -387,7 +387,7 @@ def _off_axis_m(lie: Mate, way: Array | None) -> float:
     if way is None:
         return lie.gap_m
     # Along the line the robot moves on until contact, so only the offset across it counts.
-    beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
+    beside = float(np.linalg.norm(lie.offsets - np.outer(lie.offsets @ way, way), axis=1).max())
     return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
 
 

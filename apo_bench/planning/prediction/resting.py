@@ -86,7 +86,7 @@ def residual(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -
     if isinstance(lie, Mate):
         up = _up(assembly, contact, poses)
         # The normal points the other way if the moved part has the round face.
-        return lie.off @ up, up * (-1.0 if m.face in assembly.solids[m.part].rounds else 1.0)
+        return lie.offsets @ up, up * (-1.0 if m.face in assembly.solids[m.part].rounds else 1.0)
     T_m = poses[m.part]
     plane = assembly.face(m).plane
     corners = lie.corners if len(lie.corners) else pose.apply(poses[e.part], assembly.face(e).outline)
@@ -128,7 +128,7 @@ def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     touch = measure_contact(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
-    off = touch.off.mean(axis=0)
+    off = touch.offsets.mean(axis=0)
     if isinstance(assembly.face_of(contact.manipulated), RoundFace):
         turned = _turn(touch.axis, _across(touch.axis, up))
         return np.asarray(_shift(middle - off) @ turned @ _shift(-middle))

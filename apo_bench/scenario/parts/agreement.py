@@ -16,10 +16,10 @@ from apo_bench.geometry import (
     RoundFace,
     Solid,
     find_plane_across,
+    intersect_rays,
     list_rings,
     make_flat_area,
     measure_depth_inside,
-    measure_passage,
     shrink_pieces,
 )
 from apo_bench.scenario.parts.stated import twice_area
@@ -210,7 +210,7 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
 
 def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
     """Distances at which rays `out` (r, 3) enter and leave each piece, (pieces, r) each; inf and -inf for a miss."""
-    enter, leave = np.array([measure_passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
+    enter, leave = np.array([intersect_rays(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
     behind = leave <= 0.0
     return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
 

@@ -14,7 +14,7 @@ from apo_bench.geometry import (
     find_nearest_symmetric_pose,
     find_revolution,
     find_symmetries,
-    make_turn,
+    make_rotation_about_axis,
     pose,
 )
 from apo_bench.perception.observation.models.displacement import observe_displaced
@@ -134,4 +134,6 @@ class AnyTurnNoise:
         group = find_symmetries(solid)
         body = find_revolution(solid)
         turn = np.asarray(group[rng.integers(len(group))])
-        return turn if body is None else make_turn(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn
+        return (
+            turn if body is None else make_rotation_about_axis(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn
+        )
