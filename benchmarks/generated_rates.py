@@ -22,15 +22,15 @@ import numpy as np
 
 from apo_bench.assembly import compute_placements
 from apo_bench.benchmark.analysis import Rate
-from apo_bench.importers.assembly.checking import check_file
-from apo_bench.importers.assembly.posed import TABLE
+from apo_bench.importers.assembly.posed_parts import TABLE
+from apo_bench.importers.assembly.scenario_check import check_file
 from apo_bench.records import TrialConfig
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import aim_camera, draw_picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
-from apo_bench.trial.stages import scene_of, simulate_demonstration
+from apo_bench.trial.trial_stages import scene_of, simulate_demonstration
 from benchmarks.generated import FAMILIES, generated, scenario_of
 from benchmarks.rates_by_condition import counted
 

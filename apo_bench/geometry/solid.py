@@ -26,8 +26,8 @@ class Face:
     fit: bool = False
     """Whether the physical part recedes here by the clearance; the nominal face does not."""
     stated_normal: Array | None = None
-    """The normal of a sheet (`apo_bench.assembly.projection`), whose corners may be points or the ends of a line; else
-    None."""
+    """The normal of a sheet (`apo_bench.assembly.round_contacts_as_planes`), whose corners may be points or the ends of
+    a line; else None."""
     opposes: bool = True
     """Whether a touching face must have the opposite normal; False for a plane through an axis, whose sides are
     equal."""

@@ -2,8 +2,8 @@
 
 Feature points are points such as centres and corners of faces, which a symmetry maps onto feature points of the same
 kind. Two points that are not collinear with the centre of volume determine a rotation. So every pair of points to
-which they could be mapped gives one candidate. Candidates that map all faces onto like faces, and pieces into pieces, are
-kept.
+which they could be mapped gives one candidate. Candidates that map all faces onto like faces, and pieces into pieces,
+are kept.
 """
 
 from typing import NamedTuple
@@ -39,13 +39,14 @@ def find_exact_symmetries(solid: Solid) -> Array:
     """The displacements that map a solid onto itself, (m, 4, 4), the identity first; not for parts of revolution."""
     features = _list_feature_points(solid)
     rotations = [np.eye(3)]
-    tolerance_m = _polygon_tolerance(solid)
+    symmetries = [np.eye(4)]
     for R in _candidate_rotations(features):
+        symmetry = make_rotation_about_centroid(solid, R)
         is_new = all(np.abs(R - known).max() > 1e-6 for known in rotations)
-        if is_new and _maps_onto_itself(features, R):
-            if covers_same_volume(solid, make_rotation_about_centroid(solid, R), tolerance_m):
-                rotations.append(R)
-    return np.array([make_rotation_about_centroid(solid, R) for R in rotations])
+        if is_new and _maps_onto_itself(features, R) and covers_same_volume(solid, symmetry, _polygon_tolerance(solid)):
+            rotations.append(R)
+            symmetries.append(symmetry)
+    return np.array(symmetries)
 
 
 def is_symmetry(solid: Solid, g: Array) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, Box, Solid, collect_corners, intersect_rays, measure_intrusion_depths
 from apo_bench.importers.assembly.staging import is_carried
-from apo_bench.scenario.parts.allowed import THINNEST_M
+from apo_bench.scenario.parts.limits import THINNEST_M
 
 FLOOR_M = 0.002
 """Height of the part's lowest point above the table."""

@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import require
 from apo_bench.perception.observation.noise import Noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 from apo_bench.records import check
 
 

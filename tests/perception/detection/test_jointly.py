@@ -12,8 +12,8 @@ from apo_bench import Assembly, ContactCorrector, Observation
 from apo_bench.assembly import Contact, Operation, PartFace, build_contact_equations
 from apo_bench.geometry import Hull, find_escapes, pose
 from apo_bench.geometry.penetration import measure_intrusion
-from apo_bench.perception.detection.estimate import estimate
-from apo_bench.perception.detection.jointly import detect_contacts_jointly
+from apo_bench.perception.detection.joint_detection import detect_contacts_jointly
+from apo_bench.perception.detection.pose_estimate import estimate_poses
 from tests import scenes
 from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated
 
@@ -47,7 +47,7 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
-        estimated = estimate(seen, scene.assembly, seen.poses)
+        estimated = estimate_poses(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector()(seen)
         assert (
             np.abs(build_contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
