@@ -13,6 +13,7 @@ import pytest
 from pyarrow import parquet
 
 from apo_bench import TrialConfig, load_scenario, run_trial
+from apo_bench.benchmark.datasets import trial_dataset
 from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, replays
 from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 from apo_bench.cli.app import main

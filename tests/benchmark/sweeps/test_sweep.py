@@ -23,7 +23,7 @@ from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.records import ENV_ID, RECORD_SCHEMA, get_record_key, list_setting_columns, make_trial_key
 from apo_bench.records.run.run_folder import read_records
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial import run
+from apo_bench.trial import record_start_and_end, run
 from apo_bench.trial.fingerprint import config_hash
 from apo_bench.trial.record_start_and_end import end_record
 

@@ -9,6 +9,7 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from apo_bench.importers.cad.part_import import import_solid, raw_solids
+from apo_bench.importers.cad.pieces import convex_cutting
 from tests.importers.cad.made import block, rod, write_stl
 
 RADII = (1.5, 1.5, 1.5, 2.0, 2.0, 2.5)

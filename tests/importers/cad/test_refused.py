@@ -12,6 +12,7 @@ from manifold3d import Manifold
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
+from apo_bench.importers.cad import part_import
 from apo_bench.importers.cad.part_import import import_solid, raw_solids
 from tests.importers.cad.made import block, rod, write_stl, write_triangles
 
