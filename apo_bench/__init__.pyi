@@ -28,10 +28,10 @@ from apo_bench.perception.detection.greedy_detection import detect_contacts as d
 from apo_bench.perception.observation.observe import observe as observe
 from apo_bench.records.settings import TrialConfig as TrialConfig
 from apo_bench.records.thresholds import Criteria as Criteria
-from apo_bench.scenario.scenario_file import load_scenario as load_scenario
 from apo_bench.scenario.layout import draw_layout as draw_layout
 from apo_bench.scenario.saving import save_scenario as save_scenario
 from apo_bench.scenario.scenario import Scenario as Scenario
+from apo_bench.scenario.scenario_file import load_scenario as load_scenario
 from apo_bench.simulation.arms.arm import Arm as Arm
 from apo_bench.simulation.arms.building import read_arm as read_arm
 from apo_bench.simulation.execution.config import ExecutionConfig as ExecutionConfig

@@ -11,8 +11,8 @@ from apo_bench.perception.detection.thresholds import (
     PairThresholds,
     Rules,
     compute_contact_covariance,
+    compute_contact_slack,
     compute_pair_thresholds,
-    slack,
 )
 
 _IMPLIED = 1.0
@@ -64,7 +64,7 @@ def make_candidate(
     contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
     play_m = seen.assembly.play(contact, seen.play_m)
     noise = compute_contact_covariance(pair, play_m)
-    most = compute_pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
+    most = compute_pair_thresholds(rules, C, compute_contact_slack(pair, play_m), pair.lengths)
     if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
         return None
     # Squared Mahalanobis length: C comes from the poses, noise from the play and softness of a true contact.

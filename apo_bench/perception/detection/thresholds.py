@@ -90,7 +90,7 @@ def _length_quantile(miss: float, covariance: Array, soft: float) -> float:
     return math.sqrt(_chi_square_quantile(miss, len(covariance)) * (worst + soft**2))
 
 
-def slack(pair: FacingPair, play_m: float) -> PairThresholds:
+def compute_contact_slack(pair: FacingPair, play_m: float) -> PairThresholds:
     """Gap and tilt that a true contact with this play per side can have."""
     return PairThresholds(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
 

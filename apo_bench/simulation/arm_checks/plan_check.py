@@ -66,7 +66,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     return ArmMove(
         operation=step.operation,
         undo=step.undo,
-        struck=struck,
+        collides_with=struck,
         collision_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
         beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),

@@ -13,7 +13,12 @@ from apo_bench import detect_contacts
 from apo_bench.assembly import FacingPair, classify_contact, compute_placements, find_round_pairs, measure_round_pair
 from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.perception.detection.thresholds import Rules, compute_contact_covariance, compute_pair_thresholds, slack
+from apo_bench.perception.detection.thresholds import (
+    Rules,
+    compute_contact_covariance,
+    compute_contact_slack,
+    compute_pair_thresholds,
+)
 from tests import rounds, scenes
 from tests.brackets import on_pins, under_roof
 from tests.perception.detection.test_contacts import contacts, seen_at, stated
@@ -122,7 +127,7 @@ def test_as_many_numbers_as_equations_and_as_rarely_missed_as_is_said(name: str,
     assert (pair.lengths, len(pair.residual) - pair.lengths, len(pair.half_m)) == (lengths, tilts, tilts)
     sigma = np.array([2e-3] * lengths + [np.radians(1.0)] * tilts)
     rules = Rules(miss_rate=0.01, gap_m=0.1, angle_rad=1.0)
-    most = compute_pair_thresholds(rules, np.diag(sigma**2), slack(pair, 0.0), pair.lengths)
+    most = compute_pair_thresholds(rules, np.diag(sigma**2), compute_contact_slack(pair, 0.0), pair.lengths)
     draws = np.random.default_rng(0).standard_normal((20000, len(sigma))) * sigma
     beyond = [_longer(draws[:, :lengths], most.gap_m), _longer(draws[:, lengths:], most.angle_rad)]
     assert beyond[0] == pytest.approx(0.01, abs=0.003)
