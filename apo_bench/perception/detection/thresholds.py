@@ -32,7 +32,7 @@ class Rules:
     """Least overlap as a fraction of the smaller face."""
 
     def __post_init__(self) -> None:
-        for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
+        for name, high in (("miss_rate", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
             value = getattr(self, name)
             require(
                 isinstance(value, int | float) and 0.0 < value < high,
