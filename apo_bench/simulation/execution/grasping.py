@@ -15,7 +15,7 @@ from apo_bench.geometry import (
     Solid,
     all_boxes,
     find_holds,
-    holds_whole,
+    holds_whole_width,
     measure_extent,
     measure_held_width,
     measure_intrusion_depths,
@@ -169,7 +169,7 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """
     up = upwards(T) if grasp.ahead is None else -grasp.ahead
     own = measure_held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
-    if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
+    if own is None or (all_boxes(pieces) and holds_whole_width(pieces, grasp.point, grasp.across, up)):
         low, high = measure_extent(pieces, grasp.across)
         return (high - low) / 2
     return own
@@ -218,7 +218,7 @@ def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     up = upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
-        if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
+        if around and all(holds_whole_width(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
     return [Grasp(*hold) for hold in find_holds(solid, up, scene.arm.opening_m)]
 
