@@ -23,7 +23,7 @@ from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.analysis import Rate
 from apo_bench.geometry import pose
 from apo_bench.simulation.robot import RobotError, compute_sag_per_metre
-from apo_bench.trial.stages import SimulatedDemonstration, demonstration_of
+from apo_bench.trial.trial_stages import SimulatedDemonstration, demonstration_of
 from benchmarks.provenance import with_mujoco
 from benchmarks.rates_by_condition import counted, fraction, table
 
