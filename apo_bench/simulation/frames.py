@@ -11,9 +11,10 @@ from apo_bench.geometry import Array
 
 def frame(R: ArrayLike, position: ArrayLike) -> Array:
     """The pose of a rotation, (3, 3) or (9,), and a position, (3,); as (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3] = np.reshape(R, (3, 3))
+    T = np.zeros((4, 4))
+    T[:3, :3] = np.asarray(R).reshape(3, 3)
     T[:3, 3] = position
+    T[3, 3] = 1.0
     return T
 
 

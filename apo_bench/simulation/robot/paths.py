@@ -17,6 +17,7 @@ _RAMP_S = 0.1
 """Duration of the acceleration, and of the deceleration, of a steady motion."""
 _GAIN = 0.6  # acceleration and deceleration of a paced motion, [m/s^2]
 _CELL_M = 2e-5  # spacing at which the speed of a paced motion is computed
+_ONE = np.eye(3)
 _STRAIGHT = 1e-8
 """A rotation matrix this near to the identity has its antisymmetric part as rotation vector, which saves time."""
 
@@ -48,8 +49,10 @@ class Trajectory:
     def poses(self, s: Array) -> Array:
         """Return the poses, (k, 4, 4), at fractions of the way, (k,)."""
         T = np.zeros((len(s), 4, 4))
-        turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
-        T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
+        T[:, :3, :3] = self.start[:3, :3]
+        if self.turn.any():
+            turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
+            T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * (self.end[:3, 3] - self.start[:3, 3])
         T[:, 3, 3] = 1.0
         return T
@@ -137,7 +140,7 @@ class _Table:
 def _turn_between(start: Array, end: Array) -> Array:
     """Return the rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
     R = start[:3, :3].T @ end[:3, :3]
-    if np.abs(R - np.eye(3)).max() < _STRAIGHT:
+    if np.abs(R - _ONE).max() < _STRAIGHT:
         return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
     T = np.eye(4)
     T[:3, :3] = R
