@@ -32,6 +32,13 @@ def quaternion(T: Array) -> Array:
     return q
 
 
+def rotation_vector(R: Array) -> Array:
+    """The rotation vector, (3,), [rad], of a rotation matrix, (3, 3); at most a half turn long."""
+    vector = np.zeros(3)
+    mujoco.mju_quat2Vel(vector, quaternion(R), 1.0)
+    return vector
+
+
 def body_frame(data: Any, body: int) -> Array:
     """The world pose of a body, (4, 4)."""
     return frame(data.xmat[body], data.xpos[body])

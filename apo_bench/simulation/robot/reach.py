@@ -1,5 +1,6 @@
 """Joint angles along a straight line of the tip: inverse kinematics at knots, and a cubic spline through them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -161,7 +162,7 @@ def limit_speed(
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
     """Return how many steps a line takes if none is longer than `far`, [m], or turns more than `turn`, [rad]."""
-    return max(line.length / far, float(np.linalg.norm(line.turn)) / turn)
+    return max(line.length / far, math.hypot(*line.turn) / turn)
 
 
 def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:
