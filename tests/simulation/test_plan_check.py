@@ -31,5 +31,5 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_predicted_to_fail() -> None:
     assert (refused.operation, refused.code) == (0, "unreachable_start")
     raised = {**plan.start, "table": pose.at((0.0, 0.0, 0.06), (0.0, 0.0, 0.0)) @ plan.start["table"]}
     first = arm_moves(Plan(scenario.assembly, raised, plan.target_poses), scene)[0]
-    assert first.struck == "table"
-    assert first.struck_mm > 1.0
+    assert first.gripper_obstacle == "table"
+    assert first.gripper_overlap_mm > 1.0

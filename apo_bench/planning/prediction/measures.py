@@ -53,9 +53,9 @@ class ArmMove:
     """Why the plan is not started: no joint angles reach the pick pose, or the goal and its approach."""
     at_limit: str = ""
     """The joint at its limit in a refused pose; empty if the arm is too short, or nothing is refused."""
-    struck: str = ""
+    gripper_obstacle: str = ""
     """The part that the open gripper penetrates the deepest at grasp or release."""
-    struck_mm: float = 0.0
+    gripper_overlap_mm: float = 0.0
     """That depth."""
     sag: Array = field(default_factory=lambda: np.eye(4))
     """Displacement of the held part by its weight, (4, 4), world frame, [m]."""
@@ -271,7 +271,7 @@ def _by_arm(
     how = attach[act.number] if attach else None
     for move in (move for move in arm if move.operation == act.number and not move.undo):
         allowed = thresholds.placed_part_shift_mm * same
-        yield DrawnMeasure(act.number, "gripper", move.struck_mm * same, allowed, move.struck)
+        yield DrawnMeasure(act.number, "gripper", move.gripper_overlap_mm * same, allowed, move.gripper_obstacle)
         yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 
 

@@ -156,7 +156,7 @@ class ForceSensors:
         """Return the weight on the gripper, [N]: of the held part and of everything that really hangs on it."""
         return -float(self._on_arm[:, 2].sum())  # vertical forces; parts push the arm down
 
-    def struck(self) -> str | None:
+    def find_collision(self) -> str | None:
         """Return the part with which the arm collides harder than `_COLLISION_N`, None if there is none.
 
         The part that is handled does not count.

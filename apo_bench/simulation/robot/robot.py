@@ -6,6 +6,8 @@ Every physics step of a replay is taken in one of two methods. `_tick` takes tho
 The robot knows its commands, its joint and finger positions and the force on the held part; no command depends on the
 true pose of a part. Only the simulation reads or sets these: `_look` and `slip` shift parts in the hand, `in_hand`
 records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
+
+The file is long because all these methods change one state: the command, the simulation and its time.
 """
 
 import math
@@ -407,8 +409,8 @@ class Robot:
             raise ExecutionAborted(self.stage, "unstable_simulation")
         if self._carried is not None:
             self._carried = hold_steady(self.scene.work, self.data, self.tip(), self._carried)
-        if struck := self.forces.struck():
-            raise ExecutionAborted(self.stage, "collision", struck)
+        if obstacle := self.forces.find_collision():
+            raise ExecutionAborted(self.stage, "collision", obstacle)
         if self.hooks.after_tick is not None:
             macro = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)

@@ -190,7 +190,7 @@ def test_what_an_arm_cannot_do_is_foretold() -> None:
     short = by_arm(last, refused="unreachable", at_limit="j4")
     assert (short.operation, short.code, short.size_mm) == (last, "unreachable", None)
     assert short.sentence.endswith("the arm does not reach the goal, or the way to it: its joint 'j4' is at its limit")
-    assert by_arm(1, struck="foot", struck_mm=0.9).code == "ok"
-    narrow = by_arm(1, struck="foot", struck_mm=1.1)
+    assert by_arm(1, gripper_obstacle="foot", gripper_overlap_mm=0.9).code == "ok"
+    narrow = by_arm(1, gripper_obstacle="foot", gripper_overlap_mm=1.1)
     assert (narrow.operation, narrow.code, narrow.size_mm) == (1, "gripper_room", 1.1)
     assert "in 'foot'" in narrow.sentence
