@@ -39,6 +39,13 @@ def rotation_vector(R: Array) -> Array:
     return vector
 
 
+def cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors, (3,); `np.cross` is slow on a single pair."""
+    product = np.zeros(3)
+    mujoco.mju_cross(product, a, b)
+    return product
+
+
 def body_frame(data: Any, body: int) -> Array:
     """The world pose of a body, (4, 4)."""
     return frame(data.xmat[body], data.xpos[body])

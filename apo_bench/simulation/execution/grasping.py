@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import Array, Solid, all_boxes, find_holds, holds_whole
+from apo_bench.geometry import Array, Solid, all_boxes, find_holds, holds_whole, remember
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasp_clearance import (
     GRID_M,
@@ -124,35 +124,45 @@ def _pair(
     return None
 
 
-def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
-    """Return candidate grasps of a part at T, best first.
+def _candidates(scene: Scene, solid: Solid, T: Array) -> tuple[Grasp, ...]:
+    """Return candidate grasps of a part at T, best first."""
+    return _list_candidates(solid, tuple(upwards(T).tolist()), scene.arm.opening_m)
+
+
+@remember
+def _list_candidates(solid: Solid, vertical: tuple[float, ...], opening_m: float) -> tuple[Grasp, ...]:
+    """Return candidate grasps of a part, best first; cached, since a plan asks for them several times.
 
     They lie on the bounding box if the part consists of boxes and all of them hold its full width. Else they are found
     from the shape.
+
+    Args:
+        vertical: The vertical in the frame of the part, (3,).
+        opening_m: Widest opening per finger.
     """
-    up = upwards(T)
+    up = np.array(vertical)
     if all_boxes(solid.pieces):
-        around = _around_box(scene, solid, T)
+        around = _around_box(solid, up, opening_m)
         if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
-    return [Grasp(*hold) for hold in find_holds(solid, up, scene.arm.opening_m)]
+    return tuple(Grasp(*hold) for hold in find_holds(solid, up, opening_m))
 
 
-def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
+def _around_box(solid: Solid, vertical: Array, opening_m: float) -> tuple[Grasp, ...]:
     """Return grasps across both level axes of the bounding box, the narrower one first, from the middle outwards."""
     low, high = solid.bounds
     size = high - low
     middle = (high + low) / 2
-    up = int(np.abs(T[2, :3]).argmax())
+    up = int(np.abs(vertical).argmax())
     # From the middle of the box up to the height of the tip, in the frame of the part.
-    rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
+    rise = np.sign(vertical[up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     # For each level axis across which the fingers close, the candidates are spread along the other one.
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     grasps = []
     for axis, along in (level, level[::-1]):
         reach = max(0.0, size[along] / 2 - _END_M)
         offsets = np.arange(-reach, reach + 1e-9, GRID_M) if reach > GRID_M else np.zeros(1)
-        if size[axis] / 2 + STAND_OFF_M / 2 <= scene.arm.opening_m:
+        if size[axis] / 2 + STAND_OFF_M / 2 <= opening_m:
             for offset in sorted(offsets, key=abs):
                 grasps.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
-    return grasps
+    return tuple(grasps)

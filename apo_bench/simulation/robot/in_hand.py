@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.frames import body_frame, quaternion
+from apo_bench.simulation.frames import body_frame, cross, quaternion
 from apo_bench.simulation.scene import Scene, World, get_part_pose, move_part, touches_others
 
 SLIPS_M = 5e-5
@@ -104,7 +104,7 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
         move_part(world, data, part, T)
         v = world.dof[part]
         # v = v_frame + spin x lever; MuJoCo has the spin of a free body in the frame of the body.
-        data.qvel[v : v + 3] = speed + np.cross(spin, T[:3, 3] - after[:3, 3])
+        data.qvel[v : v + 3] = speed + cross(spin, T[:3, 3] - after[:3, 3])
         data.qvel[v + 3 : v + 6] = T[:3, :3].T @ spin
 
 

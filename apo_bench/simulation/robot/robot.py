@@ -370,14 +370,9 @@ class Robot:
         model = self.model
         data = self.data
         ctrl = data.ctrl
-        if self.wrist is None and not self.forces.held:
-            with compute_only(model, data, self.forces.needed):
-                if commands is None:
-                    mujoco.mj_step(model, data, n)
-                else:
-                    for command in commands:
-                        ctrl[:] = command
-                        mujoco.mj_step(model, data)
+        if commands is None and self.wrist is None and not self.forces.held:
+            with compute_only(model, data, []):
+                mujoco.mj_step(model, data, n)
             return 0
         step_s = float(model.opt.timestep)
         sensors = self.forces.sensors
