@@ -62,10 +62,9 @@ def _step_weights(k: int, part: float) -> tuple[Array, Array]:
     Args:
         part: Length of a step over the time constant.
     """
-    steps = np.arange(k)[:, None]
-    # After step i a force of step j <= i has been kept for i - j steps.
-    weights = np.tril(part * (1.0 - part) ** np.maximum(steps - steps.T, 0))
-    return (1.0 - part) ** (steps + 1), weights
+    kept: Array = np.power(1.0 - part, np.arange(k + 1.0))  # share of a force that is left after so many steps
+    steps = np.arange(k)
+    return kept[1:, None], np.tril(part * kept[steps[:, None] - steps])
 
 
 class Guard(NamedTuple):
