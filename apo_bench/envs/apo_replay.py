@@ -45,9 +45,9 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_data_with_arm, build_scene
-from apo_bench.trial.fitting import fit_plan
+from apo_bench.trial.plan_fitting import fit_plan
 from apo_bench.trial.predicted_success import abstain, predict_success
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     demonstration_failure,
     observation_failure,
     observe_demonstration,

@@ -17,7 +17,7 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
 from apo_bench.simulation.task.tip_control import TipControl
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     WRENCH,
     demonstration_failure,
     observe_demonstration,

@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.prediction.resting import resting_poses
+from apo_bench.planning.prediction.rest_poses import predict_rest_poses
 from apo_bench.simulation.execution import Grip, compute_transferred_poses, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
@@ -65,11 +65,13 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
             continue
         floats = pose.at(t.floats * _UP) if t.into.level else np.eye(4)
         states.append(compute_transferred_poses(operation, floats @ put, resting))
-        resting = resting_poses(plan.assembly, operation, now)
+        resting = predict_rest_poses(plan.assembly, operation, now)
         for grip in t.centring:
             tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.tool
             centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
-            resting = resting_poses(plan.assembly, operation, compute_transferred_poses(operation, centred, resting))
+            resting = predict_rest_poses(
+                plan.assembly, operation, compute_transferred_poses(operation, centred, resting)
+            )
     return tuple(states)
 
 

@@ -12,7 +12,7 @@ from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
 from apo_bench.scenario.layout import place_layout
 from apo_bench.simulation.film.track import FilmTrack, Segment, scenario_segment
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.stages import SimulatedDemonstration, watch_again
+from apo_bench.trial.trial_stages import SimulatedDemonstration, watch_again
 
 # Names of the poses in a rollout.
 AS_SEEN = "as seen"

@@ -40,14 +40,14 @@ from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, Probi
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
-from apo_bench.trial.endings import end_record, record_misbehaviour, start_record
 from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.keywords import configure_trial
-from apo_bench.trial.nominal import move_nominal_poses
+from apo_bench.trial.nominal_poses import move_nominal_poses
 from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import abstain, predict_success
-from apo_bench.trial.stages import (
+from apo_bench.trial.record_start_and_end import end_record, record_misbehaviour, start_record
+from apo_bench.trial.trial_stages import (
     CONTACT_SOURCE,
     WRENCH,
     SimulatedDemonstration,

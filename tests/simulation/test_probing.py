@@ -16,7 +16,7 @@ from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import compute_low_pass_gain, filter_noise
 from apo_bench.trial.run import probing_config
-from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
+from apo_bench.trial.trial_stages import replay_and_judge, robot_error_of, simulate_demonstration
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 

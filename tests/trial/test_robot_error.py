@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.records import TrialRecord
-from apo_bench.trial.stages import draw_robot_error
+from apo_bench.trial.trial_stages import draw_robot_error
 
 SEED = 3
 

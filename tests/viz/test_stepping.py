@@ -20,8 +20,8 @@ from apo_bench.simulation.film.track import read_part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import make_initial_state
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
-from apo_bench.viz.stepping import FACES, Cursor
-from apo_bench.viz.trial_again import repeat_trial
+from apo_bench.viz.repeat_trial import repeat_trial
+from apo_bench.viz.rollout_cursor import FACES, Cursor
 
 
 def with_target_poses(scene: Scene) -> Rollout:
@@ -169,8 +169,8 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
 def test_where_nothing_can_be_shown_one_sentence_says_so(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("apo_bench.viz.viewing.no_window", lambda: "no window can be opened here (none)")
-    monkeypatch.setattr("apo_bench.viz.viewing.no_browser", lambda: "viser is not installed")
+    monkeypatch.setattr("apo_bench.viz.choose_viewer.no_window", lambda: "no window can be opened here (none)")
+    monkeypatch.setattr("apo_bench.viz.choose_viewer.no_browser", lambda: "viser is not installed")
     said = {
         ("view", "stick_in_tower"): "no window can be opened here (none), and for a browser viser is not installed",
         ("view", "stick_in_tower", "--port", "8090"): "--port 8090 needs a browser, but viser is not",

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import ProbingResult
-from apo_bench.assembly.touch import Touch, checked_pose
+from apo_bench.assembly.probing_touch import Touch, checked_pose
 from apo_bench.correction.calibration.robot_model import (
     HAND_EYE,
     TOOL,

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
-from apo_bench.planning.prediction.measures import ArmMove, Refused
+from apo_bench.planning.prediction.plan_measures import ArmMove, Refused
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
@@ -62,12 +62,12 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     if scene.arm.hand is None:  # without a gripper file only reach is predicted
         return ArmMove(step.operation, step.undo)
     T_tip = scene.kinematics.forward(path[-1])  # at the goal
-    depth, gripper_obstacle = find_gripper_overlap(scene, t, estimated, after)
+    depth, collides_with = find_gripper_overlap(scene, t, estimated, after)
     return ArmMove(
         operation=step.operation,
         undo=step.undo,
-        gripper_obstacle=gripper_obstacle,
-        gripper_overlap_mm=1e3 * depth,
+        collides_with=collides_with,
+        collision_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
         beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),
         margin_deg=float(np.degrees(np.min(list(map(scene.kinematics.limit_margins, path))))),

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from apo_bench.geometry import Array, Piece, all_boxes, holds_whole, measure_extent, measure_held_width
+from apo_bench.geometry import Array, Piece, all_boxes, holds_whole_width, measure_extent, measure_held_width
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import cross, frame
 
@@ -49,7 +49,7 @@ def _half_width(
     """Return half the width of a part between the fingers, [m]; arguments are tuples, so that the result is cached."""
     own = measure_held_width(pieces, point, across, up)
     closing = np.array(across)
-    if own is None or (all_boxes(pieces) and holds_whole(pieces, np.array(point), closing, np.array(up))):
+    if own is None or (all_boxes(pieces) and holds_whole_width(pieces, np.array(point), closing, np.array(up))):
         low, high = measure_extent(pieces, closing)
         return (high - low) / 2
     return own

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import Array, Solid, all_boxes, find_holds, holds_whole, remember
+from apo_bench.geometry import Array, Solid, all_boxes, find_holds, holds_whole_width, remember
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasp_clearance import (
     GRID_M,
@@ -143,7 +143,7 @@ def _list_candidates(solid: Solid, vertical: tuple[float, ...], opening_m: float
     up = np.array(vertical)
     if all_boxes(solid.pieces):
         around = _around_box(solid, up, opening_m)
-        if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
+        if around and all(holds_whole_width(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
     return tuple(Grasp(*hold) for hold in find_holds(solid, up, opening_m))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.planning.insertion.insertion_geometry import WALL_MARGIN_M
 from apo_bench.records import describe_outcome
 from apo_bench.simulation.execution import (
     Execution,
