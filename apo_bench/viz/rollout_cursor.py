@@ -11,12 +11,12 @@ from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.overlay import Color, FilmSnapshot, Overlay
 from apo_bench.simulation.film.track import FilmMoment, Segment, read_part_poses
-from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout
+from apo_bench.trial.rollout import AS_CORRECTED, AS_OBSERVED, AS_TRUE, Rollout
 
 Faces = Literal["none", "this operation", "all"]
 FACES: tuple[Faces, ...] = ("none", "this operation", "all")
 _COLORS: dict[str, tuple[str, Color]] = {
-    AS_SEEN: ("orange", (0.95, 0.55, 0.1)),
+    AS_OBSERVED: ("orange", (0.95, 0.55, 0.1)),
     AS_CORRECTED: ("green", (0.15, 0.7, 0.3)),
     AS_TRUE: ("violet", (0.55, 0.35, 0.85)),
 }

@@ -109,8 +109,8 @@ def test_exact_points_are_fitted_to_a_tenth_of_a_millimetre_from_some_start(name
     same = find_symmetries(SOLIDS[name])
     surface = SURFACES[name]
     begun = guess_poses(surface.corners, points.at, same)
-    fits = refine_fit(surface, points.thinned(600), begun, 0.012, 15)
-    fits = refine_fit(surface, points.thinned(600), fits.T, 0.0015, 40)
+    fits = refine_fit(surface, points.thin_out(600), begun, 0.012, 15)
+    fits = refine_fit(surface, points.thin_out(600), fits.T, 0.0015, 40)
     best = fits.T[fits.cost.argmin()]
     off = [np.abs(pose.log(pose.inverse(T) @ best @ S)) for S in same]
     assert min(max(xi[:3].max() / 1e-4, xi[3:].max() / np.radians(0.1)) for xi in off) < 1.0
@@ -120,7 +120,7 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
     rng = np.random.default_rng(3)
     surface = SURFACES["castle"]
     T = STANDING
-    exact = points_on("castle", T).thinned(900)
+    exact = points_on("castle", T).thin_out(900)
     noise = 1e-3
     bias = 1e-4
     trials = 120
