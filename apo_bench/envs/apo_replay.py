@@ -1,4 +1,7 @@
-"""The environment `APOReplay-v0`; the docstring of the class is its page in the documentation."""
+"""The environment `APOReplay-v0`; the docstring of the class is its page in the documentation.
+
+The file is long because that page takes 80 lines, and Gymnasium asks for the whole environment as one class.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -48,7 +48,14 @@ def list_edge_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
 
 def list_box_axes(R_a: Array, R_b: Array) -> Array:
     """All axes that can separate two boxes, (k, 3), world, from their orientations R_a and R_b, (3, 3)."""
-    return np.concatenate([R_a.T, R_b.T, _unit_cross_products(R_a.T, R_b.T)])
+    return _box_axes_of_numbers(R_a.tobytes(), R_b.tobytes())
+
+
+@lru_cache(maxsize=1024)
+def _box_axes_of_numbers(a: bytes, b: bytes) -> Array:
+    """`list_box_axes` of the numbers of two matrices; cached, since many boxes have the same orientations."""
+    R_a, R_b = (np.frombuffer(numbers).reshape(3, 3) for numbers in (a, b))
+    return copy_frozen(np.concatenate([R_a.T, R_b.T, _unit_cross_products(R_a.T, R_b.T)]), None, 3)
 
 
 def _unit_cross_products(edges_a: Array, edges_b: Array) -> Array:

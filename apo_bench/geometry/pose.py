@@ -35,10 +35,11 @@ def exp(twist: ArrayLike) -> Array:
     twist = np.asarray(twist, dtype=np.float64)
     K = hat(twist[..., 3:])
     # Rodrigues: R = 1 + A K + B K^2, and the shift is V v with V = 1 + B K + C K^2, A = sin a / a and so on.
-    A, B, C = _rodrigues_coefficients(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
+    A, B, C = _rodrigues_coefficients(np.sqrt((twist[..., 3:] * twist[..., 3:]).sum(axis=-1))[..., None, None])
     K2 = K @ K
-    V = np.eye(3) + B * K + C * K2
-    return rigid(np.eye(3) + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
+    one = _IDENTITY[:3, :3]
+    V = one + B * K + C * K2
+    return rigid(one + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
 
 
 def log(T: ArrayLike) -> Array:
@@ -60,7 +61,7 @@ def log(T: ArrayLike) -> Array:
 def inverse(T: ArrayLike) -> Array:
     """The inverse displacement, (*, 4, 4) -> (*, 4, 4)."""
     T = np.asarray(T, dtype=np.float64)
-    R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
+    R_inverse = T[..., :3, :3].swapaxes(-1, -2)
     return rigid(R_inverse, -(R_inverse @ T[..., :3, 3, None])[..., 0])
 
 
@@ -71,7 +72,7 @@ def hat(w: ArrayLike) -> Array:
     out[..., 0, 1] = -w[..., 2]
     out[..., 0, 2] = w[..., 1]
     out[..., 1, 2] = -w[..., 0]
-    return out - np.swapaxes(out, -1, -2)
+    return out - out.swapaxes(-1, -2)
 
 
 def adjoint(T: ArrayLike) -> Array:

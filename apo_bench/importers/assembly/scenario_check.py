@@ -20,7 +20,7 @@ from apo_bench.io import format_count, read_bytes
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, list_nominal_operations, load_scenario, place_layout
 from apo_bench.simulation.arm_checks.placing import place_in_reach
-from apo_bench.simulation.arm_checks.plan_check import struck_by
+from apo_bench.simulation.arm_checks.plan_check import find_gripper_overlap
 from apo_bench.simulation.execution import compute_transferred_poses, plan_moves, solve_key_angles
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
@@ -198,7 +198,7 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
     for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
         operation = scenario.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
-        depth, other = struck_by(scene, move.transfer, poses, after)
+        depth, other = find_gripper_overlap(scene, move.transfer, poses, after)
         if depth > _STRUCK_M:
             yield (
                 f"operation {move.step.operation + 1}, grasp: the open gripper would be {1e3 * depth:.2g} mm deep in "

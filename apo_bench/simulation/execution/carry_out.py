@@ -2,6 +2,7 @@
 
 Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers. The macros of
 the plan become guarded motions where contacts close, and position-controlled ones along contacts that stay closed.
+The file is long because the motions follow each other: it reads from top to bottom as the robot moves.
 """
 
 import math

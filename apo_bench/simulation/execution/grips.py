@@ -7,17 +7,9 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, shrink_pieces
 from apo_bench.planning.insertion.insertion_geometry import list_later_walls, list_walls_of_operation
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.grasping import (
-    Grips,
-    RestingPart,
-    Stroke,
-    clear_across,
-    grasp_at,
-    grips_along,
-    half_width,
-    list_obstacles,
-    make_tip_frame,
-)
+from apo_bench.simulation.execution.grasp_clearance import RestingPart, Stroke, list_obstacles
+from apo_bench.simulation.execution.grasp_frame import half_width, make_tip_frame
+from apo_bench.simulation.execution.grasping import Grips, clear_across, grasp_at, grips_along
 from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
 from apo_bench.simulation.robot import measure_turn
 from apo_bench.simulation.scene import Scene

@@ -6,6 +6,8 @@ Every physics step of a replay is taken in one of two methods. `_tick` takes tho
 The robot knows its commands, its joint and finger positions and the force on the held part; no command depends on the
 true pose of a part. Only the simulation reads or sets these: `_look` and `slip` shift parts in the hand, `in_hand`
 records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
+
+The file is long because all these methods change one state: the command, the simulation and its time.
 """
 
 import math
@@ -30,11 +32,11 @@ from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene import (
     Scene,
+    compute_only,
     get_part_pose,
     has_failed,
     is_unstable,
     make_initial_state,
-    switch_sensors_off,
     use_timestep,
 )
 
@@ -207,10 +209,10 @@ class Robot:
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
         self.data.ctrl[self._drives] = self._true(to[None])[0] + self._droop
         mujoco.mj_step(self.model, self.data)
-        self.forces.take(self.forces.sensors[None], self.step_s)
+        force = self.forces.take_step(self.step_s)
         if passed % self._steps_of_tick == 0:
             self._look()
-        return self.forces.net()
+        return force
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still for some time.
@@ -218,12 +220,12 @@ class Robot:
         Args:
             parts: Number of shorter steps into which each physics step is divided.
         """
-        command = self._commands(self.q[None])
+        self.data.ctrl[self._drives] = self.q + self._off
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._steps_of_tick):
             n = min(self._steps_of_tick, steps - done)
             with use_timestep(self.model, self.step_s / parts):
-                self._tick(np.repeat(command, parts * n, axis=0))
+                self._tick(parts * n)
             if n == self._steps_of_tick:
                 self._look()
 
@@ -390,18 +392,21 @@ class Robot:
         commands = self._commands(targets)
         for done in range(0, len(commands), self._steps_of_tick):
             tick = commands[done : done + self._steps_of_tick]
-            stopped = self._tick(tick, guard)
+            stopped = self._tick(len(tick), tick, guard)
             if stopped or len(tick) == self._steps_of_tick:
                 self._look()
             if stopped:
                 return done + stopped
         return len(commands)
 
-    def _tick(self, commands: Array, guard: Guard | None = None) -> int:
-        """Take one physics step for each command, (n, controls), without checking the state between them.
+    def _tick(self, n: int, commands: Array | None = None, guard: Guard | None = None) -> int:
+        """Take n physics steps, without checking the state between them.
 
-        Contact forces are read at each step if a part is held or the wrist sensor is on. With an empty hand they are
-        needed by `_look` only, so MuJoCo computes them in the last step only.
+        The forces on held parts, and those of a wrist sensor that is on, are read at each step. The others are needed
+        by `_look` only, so MuJoCo computes them for the last step only.
+
+        Args:
+            commands: Of all actuators before each step, (n, controls); None: they stay as they are.
 
         Returns:
             After how many steps the guard stopped the motion; 0 if it did not.
@@ -409,30 +414,28 @@ class Robot:
         model = self.model
         data = self.data
         ctrl = data.ctrl
-        if self.wrist is None and not self.forces.held:
-            with switch_sensors_off(model):
-                for command in commands[:-1]:
-                    ctrl[:] = command
-                    mujoco.mj_step(model, data)
-            ctrl[:] = commands[-1]
-            mujoco.mj_step(model, data)
+        if commands is None and self.wrist is None and not self.forces.held:
+            with compute_only(model, data, []):
+                mujoco.mj_step(model, data, n)
             return 0
         step_s = float(model.opt.timestep)
         sensors = self.forces.sensors
-        rows = np.empty((len(commands), len(sensors)))
+        rows = np.empty((n, len(sensors)))
         push = None if guard is None else self.forces.push(guard)
         newton = math.inf if guard is None else guard.newton
         stopped = False
         steps = 0
-        while not stopped and steps < len(commands):
-            ctrl[:] = commands[steps]
-            mujoco.mj_step(model, data)
-            rows[steps] = sensors
-            steps += 1
-            if self.wrist is not None:
-                stopped = self.wrist.take(step_s) and self.wrist.stops(guard)
-            elif push is not None:
-                stopped = bool(sensors.dot(push) > newton)
+        with compute_only(model, data, self.forces.needed if self.wrist is None else slice(None)):
+            while not stopped and steps < n:
+                if commands is not None:
+                    ctrl[:] = commands[steps]
+                mujoco.mj_step(model, data)
+                rows[steps] = sensors
+                steps += 1
+                if self.wrist is not None:
+                    stopped = self.wrist.take(step_s) and self.wrist.stops(guard)
+                elif push is not None:
+                    stopped = bool(sensors.dot(push) > newton)
         self.forces.take(rows[:steps], step_s)
         return steps if stopped else 0
 
@@ -445,8 +448,8 @@ class Robot:
             raise ExecutionAborted(self.stage, "unstable_simulation")
         if self._carried is not None:
             self._carried = hold_steady(self.scene.work, self.data, self.tip(), self._carried)
-        if struck := self.forces.struck():
-            raise ExecutionAborted(self.stage, "collision", struck)
+        if obstacle := self.forces.find_collision():
+            raise ExecutionAborted(self.stage, "collision", obstacle)
         if self.hooks.after_tick is not None:
             macro = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)

@@ -13,7 +13,7 @@ from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, flatten_face, make_plane_frame, measure_face_area, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles
+from apo_bench.simulation.execution.grasp_clearance import gripper_depth, list_obstacles
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M, upright_walls
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, translate
