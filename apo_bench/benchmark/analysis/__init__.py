@@ -44,6 +44,7 @@ from apo_bench.benchmark.analysis.settings import (
     list_levels,
     list_settings,
 )
+from apo_bench.benchmark.analysis.stratified import Estimate, average_estimates, estimate_difference, estimate_rate
 from apo_bench.benchmark.analysis.summary import Summary, summarise
 from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
 from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
@@ -56,6 +57,7 @@ __all__ = (
     "Condition",
     "ConditionResult",
     "Contrast",
+    "Estimate",
     "HalfLevel",
     "Interval",
     "Line",
@@ -64,11 +66,14 @@ __all__ = (
     "Records",
     "Results",
     "Summary",
+    "average_estimates",
     "compute_mean_surprise",
     "compute_tango_interval",
     "compute_threshold",
     "compute_wilson_interval",
     "contrast",
+    "estimate_difference",
+    "estimate_rate",
     "format_noise",
     "format_noise_label",
     "format_percent",

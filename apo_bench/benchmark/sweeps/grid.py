@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, make_dataclass
+from dataclasses import asdict, dataclass, field, make_dataclass, replace
 from itertools import product
 from numbers import Integral, Real
 from typing import Any, final
+
+import numpy as np
 
 from apo_bench.errors import require, shown
 from apo_bench.io import UNSHOWN, group_by
@@ -34,6 +36,8 @@ AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), NOIS
 _MAY_BE_EMPTY = ("clearance_mm", "noise")  # settings whose default depends on the scenario or the pose source
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """The settings that all trials of a sweep share."""
+_UNUSED_BITS = 11
+"""A drawn seed has 53 of 64 bits, so that every JSON reader keeps it exact."""
 # the scenario and its clearance are combined separately
 _VARIED = tuple(info for info in AXES if info.name not in ("scenario", "clearance_mm"))
 Batch = tuple[TrialConfig, ...]
@@ -87,6 +91,9 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     """Number of trials of each combination."""
     seed: int = field(default=0, kw_only=True)
     """The first seed; the others follow."""
+    independent_seeds: bool = field(default=False, kw_only=True)
+    """Whether each condition has seeds of its own, the same for every method, which are drawn from `seed`; by default
+    all combinations have the same seeds."""
 
     def __post_init__(self) -> None:
         if self.noise_mm != () or self.noise_deg != ():
@@ -144,12 +151,15 @@ def _plain(value: Any) -> Any:
 def check_grids(grids: Sequence[SweepConfig]) -> None:
     """Raise an `InputError` unless the grids can be one sweep.
 
-    There must be a grid, all must share arm, time step and fidelity, and there may not be too many trials.
+    There must be a grid, all must share arm, time step and fidelity, and there may not be too many trials. Independent
+    seeds are drawn from one seed.
     """
     require(grids, "no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
         require(len(values) == 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
+    drawn = {(grid.independent_seeds, grid.seed * grid.independent_seeds) for grid in grids}
+    require(len(drawn) == 1, "independent_seeds and their seed are those of the whole sweep; give each of them once.")
     most = sum(grid.trials * math.prod(max(1, len(getattr(grid, info.name))) for info in AXES) for grid in grids)
     require(
         most <= MOST_TRIALS,
@@ -181,7 +191,7 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
 def units(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None = None
 ) -> Iterator[Batch]:
-    """Yield all trials of a sweep, each once, in batches ordered by seed.
+    """Yield all trials of a sweep, each once, in batches ordered by seed, or by the number of the trial.
 
     By this order an interrupted sweep has about equally many trials of each condition.
 
@@ -189,6 +199,9 @@ def units(
     Its record has noise level 0, human error scale 0, and the first noise model or pose source. For other methods,
     settings without effect have their defaults.
     """
+    if any(grid.independent_seeds for grid in grids):
+        yield from _independent_units(grids, loaded, secret_seed)
+        return
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]  # grids that have this seed
         for source, scenario in loaded.items():
@@ -203,6 +216,53 @@ def units(
             )
             # without trials that several grids share
             yield from (tuple(dict.fromkeys(trials)) for trials in together.values())
+
+
+def draw_seed(seed: int, condition: int, trial: int) -> int:
+    """Return the seed of a trial that is independent of those of all other trials and conditions, below 2^53.
+
+    Args:
+        seed: The seed of the sweep.
+        condition: Number of the condition, from 0.
+        trial: Number of the trial in its condition, from 0.
+    """
+    drawn = np.random.SeedSequence(seed, spawn_key=(condition, trial)).generate_state(1, np.uint64)
+    return int(drawn[0]) >> _UNUSED_BITS
+
+
+def list_conditions(grids: Sequence[SweepConfig]) -> dict[SweepConfig, list[SweepConfig]]:
+    """Return each condition of a sweep, in the order of its number -> the grids of one condition that have it.
+
+    A condition is a combination of all settings but the method; as a key it has one method and one trial.
+    """
+    return group_by((replace(one, method=("oracle",), trials=1), one) for grid in grids for one in _split(grid))
+
+
+def _split(grid: SweepConfig) -> Iterator[SweepConfig]:
+    """Yield a grid for each combination of all settings but the method."""
+    names = [info.name for info in AXES if info.name != "method"]
+    for values in product(*([(value,) for value in getattr(grid, name)] or [()] for name in names)):
+        own: dict[str, Any] = dict(zip(names, values, strict=True))
+        yield replace(grid, **own)
+
+
+def _independent_units(
+    grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None
+) -> Iterator[Batch]:
+    """Yield all trials of a sweep with independent seeds; those of one condition and number have one seed."""
+    conditions = list(list_conditions(grids).values())
+    for trial in range(max(grid.trials for grid in grids)):
+        for number, ones in enumerate(conditions):
+            seed = draw_seed(grids[0].seed, number, trial)
+            batch: dict[TrialConfig, None] = {}
+            for one in ones:
+                (source,) = one.scenario
+                same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
+                clearances = one.clearance_mm or (loaded[source].clearance_mm,)
+                if trial < one.trials:
+                    batch |= dict.fromkeys(_trials(one, same | {"clearance_mm": clearances[0]}))
+            if batch:
+                yield tuple(batch)
 
 
 def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:

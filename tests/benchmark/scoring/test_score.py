@@ -6,6 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from apo_bench import InputError
@@ -13,6 +14,7 @@ from apo_bench.benchmark.scoring.entry import read_entry
 from apo_bench.benchmark.scoring.track import read_track, read_tracks, track_names
 from apo_bench.benchmark.sweeps.grid import AXES, check_grids
 from apo_bench.cli.app import main
+from apo_bench.records.run.run_folder import read_records
 
 SMALL = """
 scenario = ["block_on_block"]
@@ -45,7 +47,7 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def scored(small: Path, name: str, *entrant: str) -> dict[str, str]:
     command = ["score", *entrant, "--track", "small.toml", "--out", f"{name}.json", "--workers", "1"]
     assert main(command) == 0
-    return dict(read_entry(small / f"{name}.json").tracks["small"].cells)
+    return dict(read_entry(small / f"{name}.json").tracks["small"].conditions)
 
 
 @pytest.mark.parametrize("name", track_names())
@@ -75,6 +77,25 @@ def test_an_entry_that_is_there_is_continued_and_made_the_same(small: Path) -> N
     scored(small, "once", "contact")
     assert (small / "once" / "small" / "six_axis" / "trials.jsonl").read_bytes() == rows
     assert (small / "once.json").read_bytes() == first
+
+
+def test_the_seeds_of_a_track_are_drawn_for_each_condition_and_are_those_of_the_records(small: Path) -> None:
+    (small / "small.toml").write_text(SMALL.replace("[1]", "[1, 2]"))
+    letters = scored(small, "once", "nominal")
+    track = read_track("small.toml")
+    trials = track.find_trials("six_axis")
+    assert sorted(trials.values()) == [(f"block_on_block, noise_level {n}", k) for n in (1, 2) for k in (0, 1)]
+    records = read_records(small / "once" / "small" / "six_axis")
+    assert {record["seed"] for record in records} == set(trials)
+    for record in records:
+        condition, number = trials[record["seed"]]
+        assert f"noise_level {record['noise_mm']:g}" in condition
+        assert letters[condition][number] == str(int(bool(record["success"])))
+    seed = next(iter(trials))
+    expected = np.random.SeedSequence(0, spawn_key=(0, 0)).generate_state(1, np.uint64)[0] >> np.uint64(11)
+    assert seed == expected
+    again = ["run", "block_on_block", "--noise-level", "1", "--human-error-scale", "0", "--grasp", "weld"]
+    assert main([*again, "--method", "nominal", "--seed", str(seed)]) in (0, 1)
 
 
 def test_a_score_never_deletes_another_track(small: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,7 +131,8 @@ def test_what_is_wrong_is_said_in_one_sentence(
         ("trials = 2", "trials = 2\nmethod = 'contact'", "a track has no method"),
         ("track/1", "track/2", "schema"),
         ('title = "A small one"', 'title = "x"\nquick_trials = 0', "a whole number >= 1 is needed"),
-        ("[track]", "[[also]]\nseed = 5\n\n[track]", "begin with the same seed"),
+        ("[track]", "[[also]]\nseed = 5\n\n[track]", "have the same seed"),
+        ("[track]", "[[also]]\ntrials = 5\n\n[track]", "have the same trials"),
     ],
 )
 def test_a_track_that_is_wrong_is_refused(small: Path, old: str, new: str, said: str) -> None:
