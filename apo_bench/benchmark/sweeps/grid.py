@@ -36,6 +36,10 @@ AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), NOIS
 _MAY_BE_EMPTY = ("clearance_mm", "noise")  # settings whose default depends on the scenario or the pose source
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """The settings that all trials of a sweep share."""
+EACH = ":*"
+"""Ending of a scenario, `generated:FAMILY:*`, that draws another assembly for each trial."""
+_MOST_GENERATED = 10**15
+"""The seed of a generated scenario has at most 15 digits."""
 _UNUSED_BITS = 11
 """A drawn seed has 53 of 64 bits, so that every JSON reader keeps it exact."""
 # the scenario and its clearance are combined separately
@@ -159,6 +163,12 @@ def check_grids(grids: Sequence[SweepConfig]) -> None:
         values = {getattr(grid, name): None for grid in grids}
         require(len(values) == 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
     drawn = {(grid.independent_seeds, grid.seed * grid.independent_seeds) for grid in grids}
+    for grid in grids:
+        each = next((name for name in grid.scenario if name.endswith(EACH)), None)
+        require(
+            each is None or (grid.independent_seeds and each.startswith("generated:")),
+            f"the scenario '{each}' was given; give `generated:FAMILY:*`, with independent seeds.",
+        )
     require(len(drawn) == 1, "independent_seeds and their seed are those of the whole sweep; give each of them once.")
     most = sum(grid.trials * math.prod(max(1, len(getattr(grid, info.name))) for info in AXES) for grid in grids)
     require(
@@ -174,7 +184,7 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
     """
-    loaded = {source: load_scenario(source) for grid in grids for source in grid.scenario}
+    loaded = {source: load_scenario(source) for source in _list_sources(grids)}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
         require(
@@ -256,7 +266,7 @@ def _independent_units(
             seed = draw_seed(grids[0].seed, number, trial)
             batch: dict[TrialConfig, None] = {}
             for one in ones:
-                (source,) = one.scenario
+                source = _draw_source(one.scenario[0], seed)
                 same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
                 clearances = one.clearance_mm or (loaded[source].clearance_mm,)
                 if trial < one.trials:
@@ -265,12 +275,33 @@ def _independent_units(
                 yield tuple(batch)
 
 
+def _list_sources(grids: Sequence[SweepConfig]) -> Iterator[str]:
+    """Yield the scenarios of all trials by name or path, with those that a seed draws."""
+    if not any(grid.independent_seeds for grid in grids):
+        yield from (source for grid in grids for source in grid.scenario)
+        return
+    for number, ones in enumerate(list_conditions(grids).values()):
+        given = ones[0].scenario[0]
+        trials = max(one.trials for one in ones) if given.endswith(EACH) else 1
+        for trial in range(trials):
+            yield _draw_source(given, draw_seed(ones[0].seed, number, trial))
+
+
+def _draw_source(given: str, seed: int) -> str:
+    """Return a scenario: with the ending `:*`, which needs independent seeds, another one for each trial."""
+    return f"{given.removesuffix('*')}{seed % _MOST_GENERATED}" if given.endswith(EACH) else given
+
+
 def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
     """Return the grids for `run.json`, with scenarios by name and clearances filled in."""
     forms = []
     for grid in grids:
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
-        own = {loaded[source].name: loaded[source].clearance_mm for source in grid.scenario}
+        names = {source: loaded[source].name if source in loaded else source for source in grid.scenario}
+        own = {
+            name: loaded[source].clearance_mm if source in loaded else TrialConfig.clearance_mm
+            for source, name in names.items()
+        }
         clearances = {name: list(grid.clearance_mm or (clearance,)) for name, clearance in own.items()}
         forms.append({**values, "scenario": list(own), "clearance_mm": clearances})
     return forms
