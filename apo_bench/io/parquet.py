@@ -1,6 +1,6 @@
 """Write tables as Parquet files with pyarrow."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
@@ -43,3 +43,28 @@ def write_columns(
     arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]  # without any value
     with replace_file(path) as out:
         parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")
+
+
+def write_parts(
+    kinds: Mapping[str, type | None],
+    distinct: Mapping[str, Sequence[Any]],
+    parts: Iterable[Mapping[str, Sequence[Any]]],
+    path: Path,
+) -> None:
+    """Write a table as Parquet part by part, so that a large one need not be in memory.
+
+    Args:
+        kinds: Column -> type of its numbers; None for other values.
+        distinct: Column of other values -> its distinct values.
+        parts: Values of each column in each part, None where there is none.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    of_kind = {float: pa.float64(), int: pa.int64(), bool: pa.bool_()}
+    types = {name: pa.array(distinct[name]).type if kind is None else of_kind[kind] for name, kind in kinds.items()}
+    types = {name: pa.float64() if pa.types.is_null(kind) else kind for name, kind in types.items()}
+    schema = pa.schema(list(types.items()))
+    with replace_file(path) as out, parquet.ParquetWriter(out, schema, compression="zstd") as file:
+        for part in parts:
+            file.write_table(pa.table([pa.array(part[name], kind) for name, kind in types.items()], schema=schema))

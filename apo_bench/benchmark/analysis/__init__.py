@@ -46,7 +46,7 @@ from apo_bench.benchmark.analysis.settings import (
 )
 from apo_bench.benchmark.analysis.stratified import Estimate, average_estimates, estimate_difference, estimate_rate
 from apo_bench.benchmark.analysis.summary import Summary, summarise
-from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
+from apo_bench.benchmark.analysis.timing import read_timing, tabulate_timing
 from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
 
 __all__ = (
@@ -98,7 +98,6 @@ __all__ = (
     "tabulate_effort",
     "tabulate_gaps",
     "tabulate_probing",
-    "tabulate_trial_times",
-    "tabulate_work",
+    "tabulate_timing",
     "tally",
 )

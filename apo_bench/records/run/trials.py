@@ -7,7 +7,7 @@ import math
 import multiprocessing
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
@@ -128,6 +128,11 @@ class Trials:
         codes, names = self.coded(name)
         return codes == (names.index(None) if None in names else -1)
 
+    def equals(self, other: Trials, name: str) -> Mask:
+        """Return a mask, (n,): whether a column has the same value in two lists of n trials, or in neither."""
+        first, second = _pair_codes(self, other, name)
+        return np.asarray(first == second)
+
     def values(self, name: str) -> list[Any]:
         """Return a column as plain values, with None where a record has no value."""
         if isinstance(self.columns[name], Coded):
@@ -146,10 +151,10 @@ class Trials:
         # evaluated once per distinct value
         return np.array([bool(condition(each)) for each in names], dtype=bool)[codes]
 
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the trials as records, with the columns that are kept."""
-        columns = [self.values(name) for name in COLUMNS]
-        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+    def rows(self, names: Collection[str] = tuple(COLUMNS)) -> list[dict[str, Any]]:
+        """Return the trials as records, with the columns that are kept, or some of them."""
+        columns = [self.values(name) for name in names]
+        return [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def where(self, which: Mask | Index | slice) -> Trials:
         """Return some of the trials: by a mask, by indices in their order, or by a slice."""
@@ -184,6 +189,27 @@ class Trials:
         if len(column) != self.count:
             return np.zeros(len(self), dtype=np.int32)
         return np.unique(self.number(name), return_inverse=True)[1]
+
+
+def pair_groups(first: Trials, second: Trials, names: Iterable[str]) -> tuple[Index, Index]:
+    """Return a number for the values of each trial in some columns, (n,) and (m,); equal values have equal numbers."""
+    of = np.zeros(len(first) + len(second), dtype=np.int64)
+    for name in names:
+        own = np.concatenate(_pair_codes(first, second, name))
+        if own.max(initial=0) > 0 or own.min(initial=0) < 0:
+            own = np.unique(own, return_inverse=True)[1]
+            of = np.unique(of * (int(own.max()) + 1) + own, return_inverse=True)[1]
+    return of[: len(first)], of[len(first) :]
+
+
+def _pair_codes(first: Trials, second: Trials, name: str) -> tuple[Array, Array]:
+    """Return a number for the value of each trial of both in a column, (n,) and (m,); equal values have equal ones."""
+    if COLUMNS[name] is not None:
+        return tuple(np.nan_to_num(each.number(name), nan=-math.inf) for each in (first, second))
+    known = _Codes()
+    coded = (first.coded(name), second.coded(name))
+    of, other = (np.array([known[value] for value in each.names], dtype=np.int32)[each.codes] for each in coded)
+    return of, other
 
 
 class _Codes(dict[Any, int]):
