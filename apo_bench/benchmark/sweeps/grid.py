@@ -245,13 +245,15 @@ def list_conditions(grids: Sequence[SweepConfig]) -> dict[SweepConfig, list[Swee
 
     A condition is a combination of all settings but the method; as a key it has one method and one trial.
     """
-    return group_by((replace(one, method=("oracle",), trials=1), one) for grid in grids for one in _split(grid))
+    own: dict[str, Any] = {"method": ("oracle",), "trials": 1}
+    return group_by((replace(one, **own), one) for grid in grids for one in _split(grid))
 
 
 def _split(grid: SweepConfig) -> Iterator[SweepConfig]:
     """Yield a grid for each combination of all settings but the method."""
     names = [info.name for info in AXES if info.name != "method"]
-    for values in product(*([(value,) for value in getattr(grid, name)] or [()] for name in names)):
+    each: list[list[tuple[Any, ...]]] = [[(value,) for value in getattr(grid, name)] or [()] for name in names]
+    for values in product(*each):
         own: dict[str, Any] = dict(zip(names, values, strict=True))
         yield replace(grid, **own)
 

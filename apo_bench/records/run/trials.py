@@ -29,6 +29,8 @@ from apo_bench.records.settings import RECORD_SCHEMA, SETTINGS
 
 Mask = NDArray[np.bool_]
 """(n,): which trials."""
+Numbers = NDArray[np.floating[Any]]
+"""(n,): a column of numbers, in single precision where that keeps them exactly."""
 Index = NDArray[np.integer[Any]]
 """(n,): indices of trials, or numbers of values or groups."""
 _NOT_KEPT = (
@@ -88,7 +90,7 @@ class Groups(NamedTuple):
 class Trials:
     """Trial records as columns; a part of them shares the columns, so that it needs little memory."""
 
-    columns: Mapping[str, Array | Coded]
+    columns: Mapping[str, Numbers | Coded]
     """Column -> its m numbers, with 1 for true, and NaN where a record has no value; or its texts or tuples. A column
     with the same number everywhere has it once, (1,)."""
     count: int
@@ -196,16 +198,17 @@ def pair_groups(first: Trials, second: Trials, names: Iterable[str]) -> tuple[In
     of = np.zeros(len(first) + len(second), dtype=np.int64)
     for name in names:
         own = np.concatenate(_pair_codes(first, second, name))
-        if own.max(initial=0) > 0 or own.min(initial=0) < 0:
+        if np.ptp(own) > 0:
             own = np.unique(own, return_inverse=True)[1]
             of = np.unique(of * (int(own.max()) + 1) + own, return_inverse=True)[1]
     return of[: len(first)], of[len(first) :]
 
 
-def _pair_codes(first: Trials, second: Trials, name: str) -> tuple[Array, Array]:
+def _pair_codes(first: Trials, second: Trials, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return a number for the value of each trial of both in a column, (n,) and (m,); equal values have equal ones."""
     if COLUMNS[name] is not None:
-        return tuple(np.nan_to_num(each.number(name), nan=-math.inf) for each in (first, second))
+        # no number of a record is infinite
+        return np.nan_to_num(first.number(name), nan=np.inf), np.nan_to_num(second.number(name), nan=np.inf)
     known = _Codes()
     coded = (first.coded(name), second.coded(name))
     of, other = (np.array([known[value] for value in each.names], dtype=np.int32)[each.codes] for each in coded)
@@ -256,6 +259,7 @@ def _read_share(path: Path, start: int, end: int) -> Trials | None:
     parts = []
     with open_file(path, TRIALS_KIND) as file:
         for lines in _batched(_lines_between(file, start, end)):
+            records: list[Any]
             try:
                 records = list(map(decode_kept, lines))
             except (msgspec.DecodeError, RecursionError, ValueError):
@@ -304,7 +308,7 @@ def _batched(items: Iterable[Any]) -> Iterator[list[Any]]:
 def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping[str, Any]]) -> Trials:
     """Return columns of values, with None where a record has no value, and of failure predictions."""
     every = {**values, **{name: [each.get(key) for each in predicted] for name, key in _PREDICTED.items()}}
-    columns: dict[str, Array | Coded] = {}
+    columns: dict[str, Numbers | Coded] = {}
     for name, kind in COLUMNS.items():
         own = every.get(name, ())
         if kind is not None:
@@ -318,7 +322,7 @@ def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping
     return Trials(columns, len(predicted))
 
 
-def _shorten(column: Array) -> Array:
+def _shorten(column: Array) -> Numbers:
     """Return numbers, (n,), in less memory: one for equal ones, (1,), and half of it where that keeps them exactly."""
     if len(column) and _is_equal(column):
         return column[:1]
@@ -330,7 +334,7 @@ def _join(parts: Sequence[Trials]) -> Trials:
     """Return all trials of several parts, in their order."""
     if len(parts) == 1:
         return parts[0]
-    columns: dict[str, Array | Coded] = {}
+    columns: dict[str, Numbers | Coded] = {}
     for name, kind in COLUMNS.items():
         own: list[Any] = [part.columns[name] for part in parts]
         if kind is None:
@@ -346,6 +350,6 @@ def _join(parts: Sequence[Trials]) -> Trials:
     return Trials(columns, sum(part.count for part in parts))
 
 
-def _is_equal(column: Array) -> bool:
+def _is_equal(column: Numbers) -> bool:
     """Return whether all numbers, (n,), at least one, are equal, or all are NaN."""
     return bool(np.isnan(column).all() or (column == column[0]).all())

@@ -94,8 +94,8 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     ours, theirs = pair_groups(a.trials, b.trials, KEY)
     for side, keys in ((a, ours), (b, theirs)):
         _check_once(side, keys)
-    drawn = [~np.isnan(side.trials.number("noise_mm")) for side in (a, b)]  # without observations from files
-    first_at, second_at = (np.flatnonzero(each) for each in drawn)
+    # without observations from files
+    first_at, second_at = (np.flatnonzero(~np.isnan(side.trials.number("noise_mm"))) for side in (a, b))
     _, i, j = np.intersect1d(ours[first_at], theirs[second_at], assume_unique=True, return_indices=True)
     order = np.argsort(i)  # as in the first sweep
     require(len(i), f"'{first}' and '{second}' have no trial in common; compare sweeps of the same settings and seeds.")
