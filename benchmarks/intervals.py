@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import beta
 
-from apo_bench.benchmark.analysis import estimate_difference, estimate_rate
+from apo_bench.benchmark.analysis import measure_mean_difference, measure_mean_rate
 from apo_bench.geometry import Array
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,7 +32,7 @@ DISCORDANT = ((0.05, 0.0), (0.15, 0.0), (0.15, 0.05), (0.15, 0.1), (0.4, 0.2))
 
 
 def spread(rate: float, conditions: int, unequal: bool) -> Array:
-    """Return rates of conditions with a mean near `rate`: all equal, or those of a Beta distribution that is U-shaped."""
+    """Return rates of conditions with a mean near `rate`: all equal, or those of a U-shaped Beta distribution."""
     if not unequal or rate in (0.0, 1.0):
         return np.full(conditions, rate)
     return np.asarray(beta.ppf((np.arange(conditions) + 0.5) / conditions, rate, 1.0 - rate))
@@ -43,7 +43,7 @@ def cover_rate(rates: Array, trials: int, rng: np.random.Generator) -> float:
     truth = rates.mean()
     covered = 0
     for _ in range(DRAWS):
-        low, high = estimate_rate(list((rng.random((len(rates), trials)) < rates[:, None]).astype(float))).interval
+        low, high = measure_mean_rate(list((rng.random((len(rates), trials)) < rates[:, None]).astype(float))).interval
         covered += low - 1e-9 <= truth <= high + 1e-9
     return covered / DRAWS
 
@@ -55,7 +55,7 @@ def cover_difference(share: float, difference: float, conditions: int, trials: i
     for _ in range(DRAWS):
         drawn = rng.random((conditions, trials))
         apart = (drawn < ends[0]).astype(float) - ((drawn >= ends[0]) & (drawn < ends[1]))
-        found = estimate_difference(list(apart))
+        found = measure_mean_difference(list(apart))
         assert found is not None
         covered += found.interval.low <= difference <= found.interval.high
     return covered / DRAWS

@@ -44,7 +44,12 @@ from apo_bench.benchmark.analysis.settings import (
     list_levels,
     list_settings,
 )
-from apo_bench.benchmark.analysis.stratified import Estimate, average_estimates, estimate_difference, estimate_rate
+from apo_bench.benchmark.analysis.stratified import (
+    MeanEstimate,
+    measure_mean_difference,
+    measure_mean_rate,
+    pool_estimates,
+)
 from apo_bench.benchmark.analysis.summary import Summary, summarise
 from apo_bench.benchmark.analysis.timing import read_timing, tabulate_timing
 from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
@@ -57,7 +62,7 @@ __all__ = (
     "Condition",
     "ConditionResult",
     "Contrast",
-    "Estimate",
+    "MeanEstimate",
     "HalfLevel",
     "Interval",
     "Line",
@@ -66,14 +71,14 @@ __all__ = (
     "Records",
     "Results",
     "Summary",
-    "average_estimates",
+    "pool_estimates",
     "compute_mean_surprise",
     "compute_tango_interval",
     "compute_threshold",
     "compute_wilson_interval",
     "contrast",
-    "estimate_difference",
-    "estimate_rate",
+    "measure_mean_difference",
+    "measure_mean_rate",
     "format_noise",
     "format_noise_label",
     "format_percent",

@@ -19,7 +19,7 @@ _MOST_GAIN = 10.0
 """Largest effective number of trials, over the number of trials."""
 
 
-class Estimate(NamedTuple):
+class MeanEstimate(NamedTuple):
     """A rate, or a difference of two rates, over several conditions."""
 
     value: float
@@ -35,7 +35,7 @@ class Estimate(NamedTuple):
         return float(2.0 * ndtr(-abs(self.value) / np.sqrt(self.null_variance))) if self.null_variance > 0.0 else 1.0
 
 
-def estimate_rate(conditions: Sequence[Array]) -> Estimate:
+def measure_mean_rate(conditions: Sequence[Array]) -> MeanEstimate:
     """Return the mean over conditions of the success rate, with Wilson's interval at the effective number of trials.
 
     Without a trial it is 0, between 0 and 1.
@@ -45,13 +45,13 @@ def estimate_rate(conditions: Sequence[Array]) -> Estimate:
     """
     known = [results for results in conditions if len(results)]
     if not known:
-        return Estimate(0.0, Interval(0.0, 1.0), 0.0)
+        return MeanEstimate(0.0, Interval(0.0, 1.0), 0.0)
     rate = float(np.mean([results.mean() for results in known]))
     n = _count_effective(known, rate * (1.0 - rate))
-    return Estimate(rate, compute_wilson_interval(rate * n, n), 0.0)
+    return MeanEstimate(rate, compute_wilson_interval(rate * n, n), 0.0)
 
 
-def estimate_difference(conditions: Sequence[Array]) -> Estimate | None:
+def measure_mean_difference(conditions: Sequence[Array]) -> MeanEstimate | None:
     """Return the mean over conditions of the difference of two success rates, with Tango's interval; None without any.
 
     Args:
@@ -64,10 +64,10 @@ def estimate_difference(conditions: Sequence[Array]) -> Estimate | None:
     value = only_first - only_second
     n = _count_effective(known, only_first + only_second - value**2)
     interval = compute_tango_interval(only_first * n, only_second * n, n)
-    return Estimate(value, interval, (only_first + only_second) / n)
+    return MeanEstimate(value, interval, (only_first + only_second) / n)
 
 
-def average_estimates(estimates: Sequence[Estimate]) -> Estimate:
+def pool_estimates(estimates: Sequence[MeanEstimate]) -> MeanEstimate:
     """Return the mean of independent estimates, at least one; the parts of their intervals add as squares.
 
     After R. G. Newcombe, Interval estimation for the difference between independent proportions, Statistics in Medicine
@@ -77,7 +77,7 @@ def average_estimates(estimates: Sequence[Estimate]) -> Estimate:
     values: Array = np.array([(each.value, *each.interval) for each in estimates])
     value = float(values[:, 0].mean())
     below, above = (float(np.linalg.norm(values[:, 0] - values[:, i])) / many for i in (1, 2))
-    return Estimate(
+    return MeanEstimate(
         value, Interval(value - below, value + above), sum(each.null_variance for each in estimates) / many**2
     )
 

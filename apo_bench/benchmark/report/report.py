@@ -175,9 +175,9 @@ def _write_rows(trials: Trials, path: Path) -> Path:
 
 
 def _values(trials: Trials) -> dict[str, Any]:
-    """Return the values of each column, those of numbers as masked arrays."""
+    """Return the numbers of each column as masked arrays, and the codes of the others."""
     return {
-        name: trials.values(name)
+        name: trials.coded(name).codes
         if kind is None
         else np.ma.masked_array(np.nan_to_num(trials.number(name)).astype(kind), trials.is_null(name))
         for name, kind in COLUMNS.items()

@@ -14,11 +14,11 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.benchmark.analysis import (
-    Estimate,
     Interval,
-    average_estimates,
-    estimate_difference,
-    estimate_rate,
+    MeanEstimate,
+    measure_mean_difference,
+    measure_mean_rate,
+    pool_estimates,
 )
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
@@ -144,17 +144,17 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     def overall(self) -> tuple[float, float, float] | None:
         """Mean score over the tracks that count, in percent, and the ends of its 95 % interval; None without any."""
         those = [
-            Estimate(track.score, Interval(track.low, track.high), 0.0)
+            MeanEstimate(track.score, Interval(track.low, track.high), 0.0)
             for track in self.tracks.values()
             if track.overall
         ]
         if not those:
             return None
-        mean, (low, high), _ = average_estimates(those)
+        mean, (low, high), _ = pool_estimates(those)
         return mean, max(0.0, low), min(100.0, high)
 
 
-def compare_entries(entry: Entry, reference: Entry) -> dict[str, Estimate]:
+def compare_entries(entry: Entry, reference: Entry) -> dict[str, MeanEstimate]:
     """Return track -> difference of two entries in percentage points, first minus second, over the trials of both.
 
     Tracks without a common trial are left out: another version, or another secret seed.
@@ -164,7 +164,7 @@ def compare_entries(entry: Entry, reference: Entry) -> dict[str, Estimate]:
         theirs = reference.tracks.get(name)
         if theirs is None or (ours.track, ours.secret_seed) != (theirs.track, theirs.secret_seed):
             continue
-        apart = estimate_difference(
+        apart = measure_mean_difference(
             [
                 _subtract(trials, theirs.conditions[condition])
                 for condition, trials in ours.conditions.items()
@@ -173,7 +173,9 @@ def compare_entries(entry: Entry, reference: Entry) -> dict[str, Estimate]:
         )
         if apart is not None:
             low, high = apart.interval
-            found[name] = Estimate(100.0 * apart.value, Interval(100.0 * low, 100.0 * high), 1e4 * apart.null_variance)
+            found[name] = MeanEstimate(
+                100.0 * apart.value, Interval(100.0 * low, 100.0 * high), 1e4 * apart.null_variance
+            )
     return found
 
 
@@ -228,7 +230,7 @@ def score_of(conditions: Mapping[str, str]) -> tuple[float, float, float]:
         conditions: Settings of a condition -> its trials, one letter each. All trials are independent.
     """
     known = [trials.replace(EXCLUDED, "") for trials in conditions.values()]
-    found = estimate_rate([np.array([float(letter == RIGHT) for letter in trials]) for trials in known])
+    found = measure_mean_rate([np.array([float(letter == RIGHT) for letter in trials]) for trials in known])
     return 100.0 * found.value, 100.0 * found.interval.low, 100.0 * found.interval.high
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.analysis import Estimate, average_estimates, format_signed
+from apo_bench.benchmark.analysis import MeanEstimate, format_signed, pool_estimates
 from apo_bench.benchmark.analysis.paired import holm
 from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.benchmark.scoring.entry import Entry, TrackScore, compare_entries, read_entry
@@ -57,9 +57,9 @@ class Line(NamedTuple):
     verified: bool
     score: tuple[float, float, float] | None
     """Overall score and its interval; None of an entry without all tracks."""
-    differences: Mapping[str, Estimate]
+    differences: Mapping[str, MeanEstimate]
     """Track -> difference to the reference, in points; empty for the reference."""
-    difference: Estimate | None
+    difference: MeanEstimate | None
     """Mean difference over the tracks that count; None without a score, or a track without common trials."""
     p: float | None
     """p-value of the difference, adjusted for all comparisons."""
@@ -88,7 +88,7 @@ def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset())
     for i, entry in enumerate(order, start=1):
         found = {} if reference is None or entry is reference else compare_entries(entry, reference)
         those = [found[name] for name in sorted(counting & found.keys())]
-        whole = average_estimates(those) if scores[id(entry)] and those and counting <= found.keys() else None
+        whole = pool_estimates(those) if scores[id(entry)] and those and counting <= found.keys() else None
         verified = _is_verified(entry, secret_seeds)
         lines.append(Line(i, entry, verified, scores[id(entry)], found, whole, None))
     p = holm({line.place: line.difference.p for line in lines if line.difference is not None})
@@ -261,7 +261,7 @@ def _is_verified(entry: Entry, secret_seeds: frozenset[str]) -> bool:
     return all(track.secret_seed in secret_seeds for track in entry.tracks.values())
 
 
-def _difference_text(apart: Estimate | None) -> str | None:
+def _difference_text(apart: MeanEstimate | None) -> str | None:
     """Format a difference in points with its interval: `+4.0 (+1.2 to +6.9)`."""
     if apart is None:
         return None

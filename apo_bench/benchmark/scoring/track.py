@@ -9,7 +9,7 @@ A track is a sweep file without methods, and a table of its own:
     quick_trials = 1      # trials of each condition with --quick
     arms = ["six_axis"]   # one sweep for each; without it, the usual arm
 
-Every condition has seeds of its own, the same for every method.
+Every condition has other seeds, the same for every method.
 """
 
 import hashlib

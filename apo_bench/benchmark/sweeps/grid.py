@@ -96,7 +96,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     seed: int = field(default=0, kw_only=True)
     """The first seed; the others follow."""
     independent_seeds: bool = field(default=False, kw_only=True)
-    """Whether each condition has seeds of its own, the same for every method, which are drawn from `seed`; by default
+    """Whether each condition has other seeds, the same for every method, drawn from `seed`; by default
     all combinations have the same seeds."""
 
     def __post_init__(self) -> None:
