@@ -45,7 +45,9 @@ def in_readme(text: str) -> str:
 
 
 def outcome(of: Sequence[Entry]) -> str:
-    """Two sentences: how good the best methods are that do not have the true poses, and the bound."""
+    """Return how good the best methods are that do not have the true poses, and the bound, or that trials are few."""
+    if any(entry.quick for entry in of):
+        return "The entries ran with `--quick`, one trial of each condition: the intervals are wide.\n\n"
     scores = {line.entry.name: line.score for line in ranked(of) if line.score is not None}
     bound = scores.pop("oracle")
     (first, best), (second, next_best) = [*scores.items()][:2]
