@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -73,7 +74,8 @@ def test_what_is_written_is_read(cells: dict[str, str]) -> None:
 
 
 def _of(cells: dict[str, str]) -> dict[str, object]:
-    made = track(**{f"c{i}": trials for i, trials in enumerate(cells.values())})
+    named: Any = {f"c{i}": trials for i, trials in enumerate(cells.values())}
+    made = track(**named)
     names = ("score", "low", "high", "trials", "executed")
     return {**{name: getattr(made, name) for name in names}, "conditions": cells}
 
