@@ -26,7 +26,7 @@ grasp = ["weld"]
 schema = "apo-bench/track/1"
 title = "A small one"
 """
-AS_SEEN = """
+AS_OBSERVED = """
 import json, sys
 request = json.loads(sys.stdin.readline())
 print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
@@ -37,7 +37,7 @@ print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
-    (tmp_path / "seen.py").write_text(AS_SEEN)
+    (tmp_path / "seen.py").write_text(AS_OBSERVED)
     return tmp_path
 
 
