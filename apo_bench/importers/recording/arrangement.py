@@ -6,14 +6,17 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, measure_extent, pose
+from apo_bench.geometry import Array, Solid, find_symmetries, measure_extent, pose
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, find_camera
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
+from apo_bench.importers.recording.folding import fold_to
 from apo_bench.importers.recording.ordering import Order, Stated, end_of_operation, find_order, stated_order
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _HIGH_M = 0.01  # largest difference of height between the start of a part and its plan
+_OTHER_IMAGE_MM = 10.0
+"""Another image of a placed part counts if its contacts fit better by this; a degree counts like a millimetre."""
 _TILTED_DEG = 10.0  # largest difference of tilt
 """Beyond these limits, a part starts otherwise than planned: `otherwise` in `Arrangement.start_source`."""
 
@@ -60,18 +63,26 @@ def arrange(
         NoMatchingOrder: The motions in the log do not match the operations.
         InputError: The camera file states no pose of the camera.
     """
-    solved = find_camera(intervals, camera, planned, assembly.fixed)
+    solved = find_camera(intervals, camera, planned, assembly.fixed, assembly.solids)
     X = solved.T_world_camera
+    intervals = {part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ planned[part]) for part, known in intervals.items()}
     standing = {part: _since_standing(known, assembly, planned[part], X) for part, known in intervals.items()}
     begun = {part: X @ known[0].rests[0].T for part, known in standing.items() if known}
     start, source = find_starts(begun, camera, planned)
     in_hand = {part: "in the hand" for part in standing if part not in begun and source[part] == "scenario"}
     intervals = {part: standing[part] or known for part, known in intervals.items()}
-    if stated.ends:
+
+    def order_all(intervals: RestIntervals) -> Order:
         # Parts that a hand held all the time take their start from the scenario.
-        order = stated_order(assembly, intervals, stated.ends)
-    else:
-        order = find_order(assembly, intervals, start, X, stated.unseen)
+        if stated.ends:
+            return stated_order(assembly, intervals, stated.ends)
+        return find_order(assembly, intervals, start, X, stated.unseen)
+
+    order = order_all(intervals)
+    imaged = _image_as_in_contact(assembly, intervals, order, start, X)
+    if imaged is not intervals:
+        intervals = imaged
+        order = order_all(intervals)
     fits = {}
     for k, interval in enumerate(order.intervals):
         if interval is not None:
@@ -79,6 +90,41 @@ def arrange(
             reached = {part: X @ T for part, T in find_rest_poses(intervals, t).items()}
             fits[k] = contact_fit(assembly, k, {**start, **reached})
     return Arrangement(solved, order, start, {**source, **in_hand}, fits, intervals)
+
+
+def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Array) -> tuple[RestInterval, ...]:
+    """Return the intervals of a part with the image of all poses with which its first rest is turned least from the plan.
+
+    Args:
+        expected: Start of the part in the scenario, (4, 4), camera from part.
+    """
+    first = known[0].rests[0].T
+    g = pose.inverse(first) @ fold_to(solid, first, expected)
+    return tuple(interval.turn(g) for interval in known)
+
+
+def _image_as_in_contact(
+    assembly: Assembly, intervals: RestIntervals, order: Order, start: Poses, X: Array
+) -> RestIntervals:
+    """Return the intervals with the images of placed parts that make contact, the same intervals if all do.
+
+    Between frames, or while it is hidden, a part may turn so far that another image is nearer than its own.
+    """
+    changed = dict(intervals)
+    for k, interval in enumerate(order.intervals):
+        if interval is None:
+            continue
+        part = interval.part
+        known = intervals[part]
+        begins = known.index(interval)
+        t = end_of_operation(assembly, intervals, order.intervals, k)
+        reached = {**start, **{other: X @ T for other, T in find_rest_poses(changed, t).items()}}
+        turns = find_symmetries(assembly.solids[part])
+        wrong = [contact_fit(assembly, k, {**reached, part: reached[part] @ g}).wrong_mm for g in turns]
+        best = int(np.argmin(wrong))
+        if wrong[best] < wrong[0] - _OTHER_IMAGE_MM:
+            changed[part] = (*changed[part][:begins], *(each.turn(turns[best]) for each in changed[part][begins:]))
+    return intervals if changed == dict(intervals) else changed
 
 
 def _since_standing(

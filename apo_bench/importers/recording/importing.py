@@ -1,7 +1,7 @@
 """Import the tracks of a log as the observation of one demonstration of a scenario."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import final
 
@@ -10,14 +10,16 @@ import numpy as np
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
-from apo_bench.importers.recording.arrangement import Arrangement, arrange
+from apo_bench.importers.recording.arrangement import Arrange, Arrangement, arrange
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
+from apo_bench.importers.recording.folding import fold_track
+from apo_bench.importers.recording.matching import TagOffset, list_choices
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
-from apo_bench.importers.recording.rest_intervals import find_all_intervals
+from apo_bench.importers.recording.rest_intervals import RestIntervals, find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.perception.observation.models import UNSEEN_DEVIATION, add_shared_error, find_last_seen, floor_covariance
 from apo_bench.scenario import Scenario, place_layout
@@ -32,8 +34,14 @@ class ImportedRecording:
     observation: Observation
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
-    unclear: tuple[str, ...]
-    """Doubts about the recording, one sentence each."""
+    covariance: Array
+    """(n, 6, 6), of each observed pose without errors of the camera pose and adjustments, [m, rad]."""
+    tracks: Mapping[str, PoseTrack]
+    """Folded track of each part, camera from part."""
+    folded: Mapping[str, int]
+    """Part -> number of frames folded to another image than most."""
+    doubts: tuple[str, ...]
+    """What may be wrong with the recording, one sentence each."""
 
 
 def import_recording(
@@ -43,6 +51,8 @@ def import_recording(
     stated: Stated,
     file: str,
     models: Mapping[str, Array] | None = None,
+    identical: Sequence[Sequence[str]] = (),
+    offsets: Mapping[str, Sequence[TagOffset]] | None = None,
 ) -> ImportedRecording:
     """Return the observation that the tracks of one demonstration give.
 
@@ -50,6 +60,8 @@ def import_recording(
         tracks: Track of each part, camera from part.
         file: Name of the log, for messages.
         models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; None: the identity for all.
+        identical: Groups of parts whose tracks may belong to one another.
+        offsets: Part -> uncertainty of the places of its tags.
 
     Raises:
         InputError: A part is not of the scenario or is missing, the moves are not its operations, or no contact fits.
@@ -62,14 +74,13 @@ def import_recording(
             operation.main in tracks,
             f"{file}: '{operation.main}', which operation {k} moves, is not tracked; name its id in the objects file.",
         )
-    intervals = find_all_intervals(tracks)
+    folded = {part: fold_track(track, assembly.solids[part]) for part, track in tracks.items()}
+    tracks = {part: each.track for part, each in folded.items()}
+    intervals = find_all_intervals(tracks, assembly.solids)
     for part, known in intervals.items():
         require(known, f"{file}: '{part}' never rests; give a log in which it lies still at its places.")
     arrange_log = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
-    try:
-        arrangement = arrange_log(intervals)
-    except NoMatchingOrder as error:
-        raise InputError(f"{file}: {error}") from error
+    arrangement, tracks = _arrange_identical(tracks, intervals, arrange_log, identical, file)
     check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
@@ -84,6 +95,9 @@ def import_recording(
         if rest is not None:
             poses[k] = X @ rest.T
             covariance[k] = rest.mean.covariance + rest_error(camera, rest.mean)
+            for offset in (offsets or {}).get(assembly.operations[k].main, ()):
+                share = np.mean((offset.t >= rest.begins) & (offset.t <= rest.ends)) * len(offset.t)
+                covariance[k] += min(1.0, share / len(rest.mean.inlier)) ** 2 * offset.covariance
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
@@ -97,8 +111,32 @@ def import_recording(
         # The error of the camera pose is common to all observed poses.
         sharing = tuple(np.flatnonzero(observed).tolist())
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
-    unclear = list_doubts(intervals, arrangement, covariance, assembly)
-    return ImportedRecording(scenario, observation, arrangement, operations, unclear)
+    turned = {part: int(each.turned.sum()) for part, each in folded.items()}
+    doubts = list_doubts(intervals, arrangement, covariance, assembly)
+    return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, doubts)
+
+
+def _arrange_identical(
+    tracks: Mapping[str, PoseTrack],
+    intervals: RestIntervals,
+    arrange_log: Arrange,
+    identical: Sequence[Sequence[str]],
+    file: str,
+) -> tuple[Arrangement, Mapping[str, PoseTrack]]:
+    """Return the arrangement that fits best, and the tracks, of all ways in which identical parts may have their tracks."""
+    tried: list[tuple[Arrangement, Mapping[str, str]]] = []
+    failed: NoMatchingOrder | None = None
+    for way in list_choices(identical):
+        own = {part: way.get(part, part) for part in intervals}
+        try:
+            changed = {part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()}
+            tried.append((arrange_log(changed), own))
+        except NoMatchingOrder as error:
+            failed = failed or error
+    if not tried:
+        raise InputError(f"{file}: {failed}") from failed
+    arrangement, own = min(tried, key=lambda each: each[0].wrong_mm)
+    return arrangement, {part: tracks[other] for part, other in own.items()}
 
 
 def planned_starts(scenario: Scenario) -> Poses:

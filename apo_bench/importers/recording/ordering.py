@@ -14,6 +14,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.contact_fit import contact_fit
+from apo_bench.importers.recording.folding import list_images
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _LONG_S = 1.0  # seconds beyond which a longer interval is not worth more
@@ -81,8 +82,9 @@ def find_order(
     def worth(k: int, interval: RestInterval) -> float:
         """Return the worth of an interval as the end of operation k."""
         known = intervals[interval.part]
-        poses = {part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}
-        wrong_mm = contact_fit(assembly, k, {**start, **poses}).wrong_mm
+        poses = {**start, **{part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}}
+        images = list_images(assembly.solids[interval.part], poses[interval.part])
+        wrong_mm = min(contact_fit(assembly, k, {**poses, interval.part: T}).wrong_mm for T in images)
         is_carried_later = any(interval.part in other.carries for other in assembly.operations[k + 1 :])
         is_last = last[interval.part] == k and not is_carried_later
         left = len(known) - 1 - known.index(interval) if is_last else 0  # later intervals that no operation explains

@@ -6,7 +6,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, Solid, pose
+from apo_bench.importers.recording.folding import forget_turn
 from apo_bench.importers.recording.rests import Rest, find_rests, group_consecutive
 from apo_bench.importers.recording.tracks import PoseTrack
 
@@ -50,14 +51,33 @@ class RestInterval:
         rests = [replace(rest, mean=replace(rest.mean, T=change(rest.T))) for rest in self.rests]
         return replace(self, rests=tuple(rests))
 
+    def turn(self, g: Array) -> "RestInterval":
+        """Return the interval with the image T g in place of each pose T."""
+        A = pose.adjoint(pose.inverse(g))  # a body twist xi at T is Ad(g^-1) xi at T g
+        rests = [
+            replace(rest, mean=replace(rest.mean, T=rest.T @ g, scatter=A @ rest.mean.scatter @ A.T)) for rest in self.rests
+        ]
+        return replace(self, rests=tuple(rests))
+
 
 RestIntervals = Mapping[str, tuple[RestInterval, ...]]
 """Part -> its rest intervals in order of time."""
 
 
-def find_all_intervals(tracks: Mapping[str, PoseTrack]) -> RestIntervals:
-    """Return the rest intervals of every part; an empty tuple for a part that never rests."""
-    return {part: find_intervals(part, find_rests(track)) for part, track in tracks.items()}
+def find_all_intervals(tracks: Mapping[str, PoseTrack], solids: Mapping[str, Solid] | None = None) -> RestIntervals:
+    """Return the rest intervals of every part; an empty tuple for a part that never rests.
+
+    Args:
+        tracks: Folded tracks.
+        solids: Shapes of parts, of which those of revolution have no known turn about their axis.
+    """
+    known = {part: find_rests(track) for part, track in tracks.items()}
+    for part, rests in known.items():
+        if solids and part in solids:
+            known[part] = tuple(
+                replace(rest, mean=replace(rest.mean, scatter=forget_turn(solids[part], rest.mean.scatter))) for rest in rests
+            )
+    return {part: find_intervals(part, rests) for part, rests in known.items()}
 
 
 def find_intervals(part: str, rests: Sequence[Rest]) -> tuple[RestInterval, ...]:
