@@ -91,10 +91,14 @@ def _import_for_scenario(
 
     out, picture, paths = files
     try:
-        imported = import_recording(matched.tracks, camera, task, order, log.file, models, matched.identical, matched.offsets)
+        imported = import_recording(
+            matched.tracks, camera, task, order, log.file, models, matched.identical, matched.offsets
+        )
     except InputError:
         if picture is not None:
-            draw_recording(f"{log.file}, {task.name}; it does not fit", matched.tracks, camera.T_world_camera, [], picture)
+            draw_recording(
+                f"{log.file}, {task.name}; it does not fit", matched.tracks, camera.T_world_camera, [], picture
+            )
             typer.echo(f"Wrote {picture}, as the log was read")
         raise
     mains = [operation.main for operation in task.assembly.operations]

@@ -8,10 +8,17 @@ import numpy as np
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, Solid, find_symmetries, measure_extent, pose
 from apo_bench.importers.recording.camera_file import CameraFile
-from apo_bench.importers.recording.camera_pose import CameraPose, find_camera
+from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
 from apo_bench.importers.recording.folding import fold_to
-from apo_bench.importers.recording.ordering import Order, Stated, end_of_operation, find_order, stated_order
+from apo_bench.importers.recording.ordering import (
+    NoMatchingOrder,
+    Order,
+    Stated,
+    end_of_operation,
+    find_order,
+    stated_order,
+)
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _HIGH_M = 0.01  # largest difference of height between the start of a part and its plan
@@ -63,9 +70,30 @@ def arrange(
         NoMatchingOrder: The motions in the log do not match the operations.
         InputError: The camera file states no pose of the camera.
     """
-    solved = find_camera(intervals, camera, planned, assembly.fixed, assembly.solids)
+    found: list[Arrangement] = []
+    failed: NoMatchingOrder | None = None
+    for solved in find_cameras(intervals, camera, planned, assembly.fixed, assembly.solids):
+        try:
+            found.append(_arrange_seen(intervals, solved, camera, assembly, planned, stated))
+        except NoMatchingOrder as error:
+            failed = failed or error
+        if found and found[-1].wrong_mm < _OTHER_IMAGE_MM:
+            break
+    if not found:
+        raise failed or NoMatchingOrder("no camera pose is found.")
+    return min(found, key=lambda each: each.wrong_mm)
+
+
+def _arrange_seen(
+    intervals: RestIntervals, solved: CameraPose, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
+) -> Arrangement:
+    """Find the order of operations for a camera pose; arguments as in `arrange`."""
     X = solved.T_world_camera
-    intervals = {part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ planned[part]) for part, known in intervals.items()}
+    expected = {**planned, **camera.places(planned)}
+    intervals = {
+        part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ expected[part])
+        for part, known in intervals.items()
+    }
     standing = {part: _since_standing(known, assembly, planned[part], X) for part, known in intervals.items()}
     begun = {part: X @ known[0].rests[0].T for part, known in standing.items() if known}
     start, source = find_starts(begun, camera, planned)
@@ -93,7 +121,7 @@ def arrange(
 
 
 def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Array) -> tuple[RestInterval, ...]:
-    """Return the intervals of a part with the image of all poses with which its first rest is turned least from the plan.
+    """Return the intervals of a part with the image at which its first rest is turned least from the plan.
 
     Args:
         expected: Start of the part in the scenario, (4, 4), camera from part.

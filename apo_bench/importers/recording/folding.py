@@ -56,7 +56,9 @@ def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:
     if is_round:
         about = np.einsum("nij,nij->n", T[:, :3, :3], track.T[:, :3, :3])
         return FoldedTrack(PoseTrack(track.t, T), (about - 1.0) / 2.0 < _TURNED)
-    return FoldedTrack(PoseTrack(track.t, track.T @ symmetric[chosen]), chosen != np.bincount(chosen).argmax())
+    most = int(np.bincount(chosen).argmax())  # the image of most frames stays as it was reported
+    images = symmetric[chosen] @ pose.inverse(symmetric[most])
+    return FoldedTrack(PoseTrack(track.t, track.T @ images), chosen != most)
 
 
 def list_images(solid: Solid, T: Array, turns: int = 1) -> Array:
@@ -123,6 +125,8 @@ def turn_between(solid: Solid | None, T: Array, other: Array) -> Array:
     about = find_revolution(solid)
     if about is not None:  # only the tilt of the axis counts
         tilt = np.abs if about.reversible else (lambda x: x)
-        return np.asarray(np.arccos(np.clip(tilt(np.einsum("i,...ij,j->...", about.axis, D[..., :3, :3], about.axis)), -1, 1)))
+        return np.asarray(
+            np.arccos(np.clip(tilt(np.einsum("i,...ij,j->...", about.axis, D[..., :3, :3], about.axis)), -1, 1))
+        )
     traces = np.trace(images[..., :3, :3], axis1=-2, axis2=-1)
     return np.asarray(np.arccos(np.clip((traces.max(axis=-1) - 1.0) / 2.0, -1.0, 1.0)))

@@ -70,14 +70,16 @@ def _read_file(path: Path, how: Conventions) -> list[LogTable]:
 def _name_by_folder(tables: Sequence[LogTable]) -> list[LogTable]:
     """Return the tables of a folder with an object and an image for files that are named by an image, or by nothing."""
     stems = [table.file.stem for table in tables]
-    by_image = all(stem.rpartition("_")[2].isdigit() for stem in stems) and all(len(table.rows) < 50 for table in tables)
+    by_image = all(stem.rpartition("_")[2].isdigit() for stem in stems) and all(
+        len(table.rows) < 50 for table in tables
+    )
     repeated = len({*stems}) < len({table.file for table in tables})
     named = []
     for table, stem in zip(tables, stems, strict=True):
         folder = table.file.resolve().parent
         folder = folder.parent if folder.name in _NO_NAMES else folder
         known = {column.meaning for column in table.columns if column is not None}
-        if by_image and len(table.rows) == 1 or by_image and not known & {"t", "sec", "frame"}:
+        if (by_image and len(table.rows) == 1) or (by_image and not known & {"t", "sec", "frame"}):
             if not known & {"t", "sec", "frame"}:
                 rows = [[*row, stem.rpartition("_")[2]] for row in table.rows]
                 table = table._replace(columns=[*table.columns, LogColumn("frame")], rows=rows)

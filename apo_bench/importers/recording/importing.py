@@ -123,13 +123,15 @@ def _arrange_identical(
     identical: Sequence[Sequence[str]],
     file: str,
 ) -> tuple[Arrangement, Mapping[str, PoseTrack]]:
-    """Return the arrangement that fits best, and the tracks, of all ways in which identical parts may have their tracks."""
+    """Return the best arrangement, and its tracks, of all ways in which identical parts may have their tracks."""
     tried: list[tuple[Arrangement, Mapping[str, str]]] = []
     failed: NoMatchingOrder | None = None
     for way in list_choices(identical):
         own = {part: way.get(part, part) for part in intervals}
         try:
-            changed = {part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()}
+            changed = {
+                part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()
+            }
             tried.append((arrange_log(changed), own))
         except NoMatchingOrder as error:
             failed = failed or error

@@ -16,8 +16,30 @@ from apo_bench.importers.recording.log_tables import LARGEST_LOG_BYTES, LogTable
 from apo_bench.io import read_text
 
 _POSITIONS = ("position", "translation", "pose_t", "tvec", "cam_t_m2c", "trans", "t", "xyz")
-_ROTATIONS = ("orientation", "rotation", "pose_R", "cam_R_m2c", "rvec", "quaternion", "quat", "rotation_matrix", "R", "q")
-_MATRICES = ("matrix", "pose", "transform", "T", "ob_in_cam", "pose_matrix", "TCO", "T_cam_obj", "T_cam_object", "cam_T_obj")
+_ROTATIONS = (
+    "orientation",
+    "rotation",
+    "pose_R",
+    "cam_R_m2c",
+    "rvec",
+    "quaternion",
+    "quat",
+    "rotation_matrix",
+    "R",
+    "q",
+)
+_MATRICES = (
+    "matrix",
+    "pose",
+    "transform",
+    "T",
+    "ob_in_cam",
+    "pose_matrix",
+    "TCO",
+    "T_cam_obj",
+    "T_cam_object",
+    "cam_T_obj",
+)
 _PAIRS = ("TWO", "TCO")  # quaternion xyzw and position, as MegaPose writes them
 _AROUND = ("header", "stamp", "hypothesis", "msg", "message", "data")  # their fields count for the object around them
 _NO_POSES = ("bbox", "camera", "covariance", "twist", "camera_params", "corners", "center")
@@ -37,7 +59,9 @@ def read_json_tables(path: Path) -> list[LogTable]:
             by_names.setdefault(names, []).append(([fields[name] for name in names], place))
     require(by_names, f"{path}: no pose is found: a position and an orientation, a rotation or a 4 x 4 matrix.")
     return [
-        LogTable(path, "JSON", path.stem, [find_column(name) for name in names], [r for r, _ in rows], [p for _, p in rows])
+        LogTable(
+            path, "JSON", path.stem, [find_column(name) for name in names], [r for r, _ in rows], [p for _, p in rows]
+        )
         for names, rows in by_names.items()
     ]
 

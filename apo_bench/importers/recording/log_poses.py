@@ -1,4 +1,4 @@
-"""Convert the tables of a log to times and poses in metres, camera from model, by the conventions of the camera file."""
+"""Convert the tables of a log to times and poses, camera from model, by the conventions of the camera file."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -100,7 +100,9 @@ def _numbers(cells: Sequence[Any], table: LogTable, column: LogColumn) -> Array:
     """Return the cells of a column as numbers, (n,), NaN where they are none; most of them must be numbers or empty."""
     numbers = np.array([_number(cell) for cell in cells])
     numbers[~(np.abs(numbers) <= _LARGEST)] = np.nan
-    words = [i for i in np.flatnonzero(np.isnan(numbers)) if str(cells[i]).strip().lower() not in ("", "nan", "none", "null")]
+    words = [
+        i for i in np.flatnonzero(np.isnan(numbers)) if str(cells[i]).strip().lower() not in ("", "nan", "none", "null")
+    ]
     if len(words) > (1.0 - _FEWEST_GOOD) * len(cells):
         given = one_line(str(cells[words[0]]), 40)
         raise InputError(f"{table.places[words[0]]}, column {column.meaning}: a number is needed, '{given}' was given.")
@@ -141,8 +143,8 @@ def _length_unit(
     fits = [unit for unit in ("m", "mm") if NEAREST_M <= distance * UNITS["length"][unit] <= FARTHEST_M]
     require(
         fits,
-        f"{table.file}: the unit of the column 'x' is not known; end its name with _mm, _cm or _m, or state `length` in "
-        "the camera file.",
+        f"{table.file}: the unit of the column 'x' is not known; end its name with _mm, _cm or _m, or state `length` "
+        "in the camera file.",
     )
     return UNITS["length"][fits[0]], [f"lengths taken for {fits[0]}, as no unit is stated"]
 
@@ -206,7 +208,11 @@ def _read_rotations(
         skew = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         good = (skew <= _LENGTH_TOLERANCE) & (np.linalg.det(R) > 0.0)
         _check_share(good, finite, table, "a rotation matrix, row by row")
-        return pose.nearest_rotations(np.where(good[:, None, None], R, np.eye(3))), good, "rotation matrices, row by row"
+        return (
+            pose.nearest_rotations(np.where(good[:, None, None], R, np.eye(3))),
+            good,
+            "rotation matrices, row by row",
+        )
     if names in (log_columns.QUATERNION, log_columns.NUMBERED_QUATERNION):
         order = "wxyz" if names == log_columns.QUATERNION else how.quaternion
         require(order, f'{table.file}: q0 to q3 have no stated order; state `quaternion = "wxyz"` in the camera file.')
@@ -236,9 +242,7 @@ def _angle_unit(table: LogTable, column: LogColumn, how: Conventions) -> float:
     return UNITS["angle"][unit]
 
 
-def _has_unit_length(
-    vectors: Array, finite: NDArray[np.bool_], table: LogTable, needed: str
-) -> NDArray[np.bool_]:
+def _has_unit_length(vectors: Array, finite: NDArray[np.bool_], table: LogTable, needed: str) -> NDArray[np.bool_]:
     """Return which vectors, (n, k), have length 1; most of those that are not zero must."""
     length = np.linalg.norm(vectors, axis=1)
     good = np.abs(length - 1.0) <= _LENGTH_TOLERANCE

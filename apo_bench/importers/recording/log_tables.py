@@ -130,7 +130,9 @@ def _understand(
         for theirs, mine in ours.items():
             place = f"{path}: the camera file, log.columns"
             require_known("column", theirs, [name.lower() for name in names], place=place)
-            require(find_column(mine), f"{place}: '{one_line(mine, 40)}' has no meaning; use names such as id, t_s, x_mm.")
+            require(
+                find_column(mine), f"{place}: '{one_line(mine, 40)}' has no meaning; use names such as id, t_s, x_mm."
+            )
     lower = [name.strip().lower() for name in names]
     from_zero = any(re.search(r"(m|r|rot)_?0_?0$", name) for name in lower)
     return [find_column(ours.get(name, name), from_zero) for name in lower]
@@ -156,7 +158,7 @@ def _collect(
             continue
         cells = _split(line.text, separator)
         cells += [""] * (len(columns) - len(cells) if separator != " " and len(cells) == len(columns) - 1 else 0)
-        if len(cells) == len(columns) or not any(cells[len(columns) :]) and len(cells) > len(columns):
+        if len(cells) == len(columns) or (not any(cells[len(columns) :]) and len(cells) > len(columns)):
             rows.append(cells[: len(columns)])
             places.append(f"{path}, line {line.number}")
         else:
@@ -179,7 +181,11 @@ def _split_objects(table: LogTable) -> list[LogTable]:
         kept: list[LogColumn | None] = []
         nearest: dict[str, LogColumn] = {}
         for column in table.columns:
-            if column is not None and column.meaning in SHARED and f"{of}.".startswith(f"{column.of}." if column.of else ""):
+            if (
+                column is not None
+                and column.meaning in SHARED
+                and f"{of}.".startswith(f"{column.of}." if column.of else "")
+            ):
                 known = nearest.get(column.meaning)
                 nearest[column.meaning] = column if known is None or len(column.of) > len(known.of) else known
         for column in table.columns:
@@ -245,7 +251,8 @@ def _refuse_header(path: Path, lines: Sequence[_Line], separator: str, renamed: 
     missing = "a position" if not meanings >= {*POSITION} else "one rotation"
     raise InputError(
         f"{path}, line {number}: {missing} is missing; understood: {_listed(understood)}; not understood: "
-        f"{_listed(ignored)}; name columns such as x_mm y_mm z_mm and qw qx qy qz, or state `columns` in the camera file."
+        f"{_listed(ignored)}; name columns such as x_mm y_mm z_mm and qw qx qy qz, or state `columns` in the camera "
+        "file."
     )
 
 
@@ -266,9 +273,15 @@ def _read_motion_capture(
     is_vicon = axes[1].lower().replace(" ", "") == "subframe"
     units = _split(lines[0].text, separator) if is_vicon else []
     stated = " ".join(cell for head in heads for cell in head).lower()
-    unit = next((short for long, short in (("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m")) if long in stated), "")
+    unit = next(
+        (short for long, short in (("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m")) if long in stated), ""
+    )
     rates = re.search(r"(?:export|capture) frame rate\s+([\d.]+)", stated)
-    rate = float(rates[1]) if rates else next((float(h[0]) for h in heads if len([c for c in h if c]) == 1 and _is_number(h[0])), 0.0)
+    rate = (
+        float(rates[1])
+        if rates
+        else next((float(h[0]) for h in heads if len([c for c in h if c]) == 1 and _is_number(h[0])), 0.0)
+    )
     kinds = [""] * len(axes)  # rotation or position
     names = [""] * len(axes)
     bodies = [True] * len(axes)
@@ -302,12 +315,14 @@ def _read_motion_capture(
     columns = [_complete_rotation(column, columns) for column in columns]
     rows = [line for line in lines[int(is_vicon) :] if _is_number(line.text.split(separator)[0])]
     form = "Vicon CSV" if is_vicon else "Motive CSV"
-    require(_complete_objects(columns), f"{path}: the {form} has no rigid body with a position and a rotation; export both.")
+    require(
+        _complete_objects(columns), f"{path}: the {form} has no rigid body with a position and a rotation; export both."
+    )
     return _split_objects(_collect(path, form, columns, rows, separator)._replace(rate_hz=rate))
 
 
 def _complete_rotation(column: LogColumn | None, columns: Sequence[LogColumn | None]) -> LogColumn | None:
-    """Return a column with the meaning of its rotation: quaternions have a w, else Euler angles or a rotation vector."""
+    """Return a column with the meaning of its rotation: a quaternion, which has a w, Euler angles or a rotation vector."""
     if column is None or column.meaning not in (*QUATERNION, *ROTATION_VECTOR):
         return column
     own = {each.meaning for each in columns if each is not None and each.of == column.of}

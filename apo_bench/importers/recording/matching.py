@@ -1,4 +1,4 @@
-"""Match the ids of a log to parts: one id, several tags on a part, one id for identical parts, ids that were swapped."""
+"""Match the ids of a log to parts: several tags on a part, one id for identical parts, ids that were swapped."""
 
 from collections.abc import Mapping, Sequence
 from itertools import permutations, product
@@ -10,17 +10,19 @@ from scipy.optimize import linear_sum_assignment
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.importers.recording.averaging import average, per_axis
-from apo_bench.importers.recording.folding import are_alike, fold_track, turn_between
+from apo_bench.importers.recording.folding import are_alike, fold_track, list_images, turn_between
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart
-from apo_bench.importers.recording.tracks import Candidates, Log, PoseTrack, best_poses, span_of
+from apo_bench.importers.recording.tracks import Log, PoseTrack, best_poses, span_of
 
 _GATE_M = 0.05  # a pose farther from the last one of a track is no continuation
 _M_PER_RAD = 0.03  # a turn by a radian counts like this distance
 _SWITCH_M = 0.008  # cost of another id than before
 _MOST_CHOICES = 120  # ways in which identical parts are told apart, at most
 _FEWEST_COMMON = 3  # frames that show two tags, from which their offset is solved
-_FRAMES_BESIDE = 6  # frames of each id, before and after one follows another
-_SAME_RAD = 0.3  # an id that goes on with a smaller turn is another name of the one before
+_FRAMES_BESIDE = 4  # frames of each id, before and after one follows another
+_TURNS = 24  # turns about an axis of revolution that are compared
+_SAME_M = 0.008  # an id that goes on within this, and a step of the part, is another name of the one before
+_SAME_RAD = 0.3  # the same for a turn
 _NEAR_S = 0.5  # largest time between the last frame of an id and the first of the id that follows it
 _MOST_IDS = 12  # ids that an error names
 
@@ -88,7 +90,9 @@ def match_tracks(log: Log, objects: ObjectsFile, solids: Mapping[str, Solid]) ->
     identical = []
     for known_ids, parts in by_ids.items():
         if len(parts) == 1:
-            tracks[parts[0]] = _join_tags(log, parts[0], objects.parts[parts[0]], known_ids, solids, offsets, notes, doubts)
+            tracks[parts[0]] = _join_tags(
+                log, parts[0], objects.parts[parts[0]], known_ids, solids, offsets, notes, doubts
+            )
             continue
         require(len(known_ids) == 1, f"{objects.file}: parts that share an id have that id alone.")
         frames = [objects.parts[part].T_model_part for part in parts]
@@ -96,7 +100,9 @@ def match_tracks(log: Log, objects: ObjectsFile, solids: Mapping[str, Solid]) ->
         labels = follow_parts(poses.t, poses.T @ frames[0], None, len(parts), solids.get(parts[0]))
         for i, part in enumerate(parts):
             mine = labels == i
-            require(mine.any(), f"{log.file}: the id '{known_ids[0]}' is that of {len(parts)} parts, and {i} are there.")
+            require(
+                mine.any(), f"{log.file}: the id '{known_ids[0]}' is that of {len(parts)} parts, and {i} are there."
+            )
             tracks[part] = PoseTrack(poses.t[mine], poses.T[mine] @ frames[i])
         identical.append(parts)
         notes.append(f"id {known_ids[0]} followed as {len(parts)} parts ({', '.join(parts)})")
@@ -109,7 +115,7 @@ def match_tracks(log: Log, objects: ObjectsFile, solids: Mapping[str, Solid]) ->
 
 
 def _find_id(name: str, log: Log) -> str | None:
-    """Return the id of the log that an id of the objects file means: the same, or the only one with this in its path."""
+    """Return the id of the log that an id of the objects file means: itself, or the only one with it in its path."""
     if name in log.candidates:
         return name
     among = [known for known in log.candidates if name.strip("/") in (known, *known.split("/"))]
@@ -145,7 +151,11 @@ def follow_parts(t: Array, T: Array, labels: Array | None, k: int, solid: Solid 
     span = span_of(PoseTrack(np.unique(t), np.zeros((0, 4, 4))))
     images = np.cumsum(np.concatenate([[0], np.diff(t) > (0.5 * span if labels is not None else 1e-9)]))
     for image in range(images[-1] + 1):
-        at = np.flatnonzero(images == image) if labels is None else _one_for_each(np.flatnonzero(images == image), labels)
+        at = (
+            np.flatnonzero(images == image)
+            if labels is None
+            else _one_for_each(np.flatnonzero(images == image), labels)
+        )
         known = ~np.isnan(last[:, 0, 0])
         cost = np.full((k, len(at)), _GATE_M)
         if known.any():
@@ -203,7 +213,8 @@ def _undo_swaps(
             mine = own == i
             tracks[part] = PoseTrack(t[mine], T[mine])
         notes.append(
-            f"ids of {' and '.join(group)} swapped in {int(swapped.sum())} frames from {t[swapped][0]:.2f} s on, and put right"
+            f"ids of {' and '.join(group)} swapped in {int(swapped.sum())} frames from "
+            f"{t[swapped][0]:.2f} s on, and put right"
         )
     return notes
 
@@ -251,7 +262,7 @@ class _Offset(NamedTuple):
 
 
 def _solve_offset(track: PoseTrack, other: PoseTrack, solid: Solid | None) -> _Offset:
-    """Return the pose of a part in the frame of another tag: from common frames, or from where one follows the other."""
+    """Return the pose of a part in the frame of another tag, from common frames or from where it follows the first."""
     span = min(span_of(track), span_of(other))
     near = np.clip(np.searchsorted(other.t, track.t - 0.5 * span), 0, len(other.t) - 1)
     common = np.abs(other.t[near] - track.t) <= 0.5 * span
@@ -262,18 +273,33 @@ def _solve_offset(track: PoseTrack, other: PoseTrack, solid: Solid | None) -> _O
     gaps = np.abs(track.t[:, None] - other.t[None, :])
     i, j = (int(x) for x in np.unravel_index(int(np.argmin(gaps)), gaps.shape))
     between = pose.inverse(other.T[j]) @ track.T[i]
-    is_same = np.linalg.norm(between[:3, 3]) < _GATE_M and turn_between(solid, other.T[j], track.T[i]) < _SAME_RAD
+    images = between[None] if solid is None else list_images(solid, between, _TURNS)
+    off = pose.log(images)
+    step_m = max(
+        np.linalg.norm(np.diff(each, axis=0), axis=1).mean()
+        for each in (track.T[max(0, i - 3) : i + 3, :3, 3], other.T[max(0, j - 3) : j + 3, :3, 3])
+    )
+    is_same = bool(
+        np.any(
+            (np.linalg.norm(off[:, :3], axis=1) < _SAME_M + step_m * gaps[i, j] / span)
+            & (np.linalg.norm(off[:, 3:], axis=1) < _SAME_RAD)
+        )
+    )
     if is_same or gaps[i, j] > _NEAR_S:
         text = "taken for another name of the first id, since it goes on where that ends"
         if not is_same:
-            text = f"taken for another name of the first id, though it begins {gaps[i, j]:.1f} s apart; state its `frame`"
+            text = (
+                f"taken for another name of the first id, though it begins {gaps[i, j]:.1f} s apart; state its `frame`"
+            )
         return _Offset(np.eye(4), np.zeros((6, 6)), text, not is_same)
     # The part moves smoothly from the last frames of one id to the first of the other: a parabola, and a step between.
     sides = (track, other) if track.t[i] < other.t[j] else (other, track)
     before = np.flatnonzero(sides[0].t <= min(track.t[i], other.t[j]))[-_FRAMES_BESIDE:]
     after = np.flatnonzero(sides[1].t >= max(track.t[i], other.t[j]))[:_FRAMES_BESIDE]
     t = np.concatenate([sides[0].t[before], sides[1].t[after]]) - track.t[i]
-    poses = [(each.T @ between if each is other else each.T)[at] for each, at in zip(sides, (before, after), strict=True)]
+    poses = [
+        (each.T @ between if each is other else each.T)[at] for each, at in zip(sides, (before, after), strict=True)
+    ]
     xi = pose.log(pose.inverse(track.T[i]) @ np.concatenate(poses))
     is_other = np.repeat([each is other for each in sides], [len(before), len(after)])
     A = np.column_stack([np.ones(len(t)), t, t**2, is_other])
@@ -281,8 +307,8 @@ def _solve_offset(track: PoseTrack, other: PoseTrack, solid: Solid | None) -> _O
     left = xi - A @ x
     variance = (left**2).sum(axis=0) / max(len(t) - rank, 1) * np.linalg.pinv(A.T @ A)[3, 3]
     text = (
-        f"its frame solved within {_size_text(np.diag(variance))} from {len(t)} frames where it follows the first id, since "
-        "no frame shows both; state its `frame`"
+        f"its frame solved within {_size_text(np.diag(variance))} from {len(t)} frames where it follows the first id, "
+        "since no frame shows both; state its `frame`"
     )
     return _Offset(between @ pose.exp(-x[3]), np.diag(variance), text, True)
 

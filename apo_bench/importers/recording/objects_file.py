@@ -93,6 +93,8 @@ def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
             continue
         part = max(of, key=len)
         ids = (*parts[part].ids, *tracked.ids)
-        stated = {} if (tracked.T_model_part == pose.at((0.0, 0.0, 0.0))).all() else {tracked.ids[0]: tracked.T_model_part}
+        stated = (
+            {} if (tracked.T_model_part == pose.at((0.0, 0.0, 0.0))).all() else {tracked.ids[0]: tracked.T_model_part}
+        )
         parts[part] = TrackedPart(ids, parts[part].T_model_part, {**parts[part].others, **stated, **tracked.others})
     return ObjectsFile(objects.file, parts, objects.ignored)

@@ -67,6 +67,10 @@ def observed_operation(
         for part in operation.carries
         if part in before
     }
-    others = {part: pose.log(pose.inverse(T) @ after[part]) for part, T in before.items() if part != operation.main}
-    adjusted = {part: twist for part, twist in others.items() if part not in carried and twist.any()}
+    # What moves a part before its own operations have ended is no error of where they left it.
+    placed = assembly.fixed | {part for earlier in assembly.operations[:k] for part in earlier.moves}
+    others = {part: pose.log(pose.inverse(T) @ after[part]) for part, T in before.items() if part in placed}
+    adjusted = {
+        part: twist for part, twist in others.items() if part not in carried and part != operation.main and twist.any()
+    }
     return LoggedOperation(interval, rest, path, carried, adjusted)

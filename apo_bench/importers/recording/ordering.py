@@ -22,6 +22,8 @@ _WIDE_MM = 50.0  # misfit beyond which a contact is not worse
 """The worth of an interval is its seconds, up to 1, less 1 for each 10 mm of misfit, up to 5."""
 _LEFT_OVER = 5.0
 """Penalty for each interval that no operation explains."""
+_SKIPPED = 8.0
+"""Penalty for an operation that nobody saw, as its part was hidden."""
 _OVERLAP_S = 0.3
 """An operation may take its part this much earlier than the part of the previous operation comes to rest."""
 _CLOSE = 0.3
@@ -58,7 +60,7 @@ class _Choice(NamedTuple):
 
     worth: float
     begins: float
-    """Begin of the last interval, [s]."""
+    """Begin of the last interval, [s]; the earliest time, if its part was hidden before."""
     intervals: Chosen
 
 
@@ -149,8 +151,15 @@ def _best_choices(
                     # Intervals that contradict the order.
                     amiss = moved_on + _strangers(intervals, operation.moves, choice.begins, interval)
                     value = choice.worth + worth(k, interval) - _LEFT_OVER * amiss
-                    longer = _Choice(value, interval.begins, (*choice.intervals, interval))
+                    longer = _Choice(value, max(choice.begins, interval.came), (*choice.intervals, interval))
                     by_end.setdefault(interval, []).append(longer)
+        if any(
+            interval.gone > interval.ends or interval.came < interval.begins for interval in intervals[operation.main]
+        ):
+            # The part may have come to rest and gone again while it was hidden.
+            skipped = [_Choice(c.worth - _SKIPPED, c.begins, (*c.intervals, None)) for c in choices]
+            choices = [*(each for ending in by_end.values() for each in _best_two(ending)), *_best_two(skipped)]
+            continue
         if not by_end:
             rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
             raise NoMatchingOrder(
@@ -177,7 +186,7 @@ def _strangers(intervals: RestIntervals, moved: Collection[str], t: float, until
         until: The interval that ends the operation.
     """
     return sum(
-        any(t + _OVERLAP_S < other.begins < until.begins + _OVERLAP_S for other in known[1:])
+        any(t + _OVERLAP_S < other.came and other.begins < until.begins + _OVERLAP_S for other in known[1:])
         for part, known in intervals.items()
         if part not in moved
     )
@@ -235,6 +244,6 @@ def _moves_between(assembly: Assembly, intervals: RestIntervals, before: Chosen,
     if last is None:
         return 0
     t = time_taken(assembly, intervals, before, interval)
-    if last.begins > t + _OVERLAP_S:
+    if last.came > t + _OVERLAP_S:
         return None
     return sum(last.begins < other.begins < t - _OVERLAP_S for other in intervals[last.part])

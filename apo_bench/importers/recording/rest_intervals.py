@@ -38,6 +38,11 @@ class RestInterval:
         return self.rests[-1].gone
 
     @property
+    def came(self) -> float:
+        """The time from which on the part may have been there, [s]: when it was last observed, if it was hidden."""
+        return self.rests[0].came
+
+    @property
     def seconds(self) -> float:
         """Total duration of the rests, [s]."""
         return sum(rest.ends - rest.begins for rest in self.rests)
@@ -55,7 +60,8 @@ class RestInterval:
         """Return the interval with the image T g in place of each pose T."""
         A = pose.adjoint(pose.inverse(g))  # a body twist xi at T is Ad(g^-1) xi at T g
         rests = [
-            replace(rest, mean=replace(rest.mean, T=rest.T @ g, scatter=A @ rest.mean.scatter @ A.T)) for rest in self.rests
+            replace(rest, mean=replace(rest.mean, T=rest.T @ g, scatter=A @ rest.mean.scatter @ A.T))
+            for rest in self.rests
         ]
         return replace(self, rests=tuple(rests))
 
@@ -75,7 +81,8 @@ def find_all_intervals(tracks: Mapping[str, PoseTrack], solids: Mapping[str, Sol
     for part, rests in known.items():
         if solids and part in solids:
             known[part] = tuple(
-                replace(rest, mean=replace(rest.mean, scatter=forget_turn(solids[part], rest.mean.scatter))) for rest in rests
+                replace(rest, mean=replace(rest.mean, scatter=forget_turn(solids[part], rest.mean.scatter)))
+                for rest in rests
             )
     return {part: find_intervals(part, rests) for part, rests in known.items()}
 

@@ -22,7 +22,11 @@ _POSE_UNITS = copy_frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 
 
 def summary_lines(
-    log: Log, matched: MatchedTracks, folded: Mapping[str, int], camera: CameraPose, placed: Sequence[tuple[str, Rest | None]]
+    log: Log,
+    matched: MatchedTracks,
+    folded: Mapping[str, int],
+    camera: CameraPose,
+    placed: Sequence[tuple[str, Rest | None]],
 ) -> list[tuple[str, str]]:
     """Return five lines on what was read and done: pairs of label and text.
 
@@ -37,7 +41,8 @@ def summary_lines(
     done = [f"{n} of {part} folded to the nearest image under its symmetry" for part, n in folded.items() if n]
     done += [f"{n} left out ({kind})" for kind, n in lost.items()]
     rests = [
-        f"{part} not observed" if rest is None else f"{part} {rest.begins:.2f} to {rest.ends:.2f} s" for part, rest in placed
+        f"{part} not observed" if rest is None else f"{part} {rest.begins:.2f} to {rest.ends:.2f} s"
+        for part, rest in placed
     ]
     known = [rest for _, rest in placed if rest is not None]
     frames = sum(len(rest.mean.inlier) for rest in known)

@@ -178,5 +178,3 @@ def select(track: PoseTrack, kept: NDArray[np.bool_] | Array) -> PoseTrack:
 def span_of(track: PoseTrack) -> float:
     """Return the usual time between two frames of a track, [s]."""
     return max(float(np.median(np.diff(track.t))), 1e-6) if len(track.t) > 1 else SLOWEST_S
-
-
