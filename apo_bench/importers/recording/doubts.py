@@ -47,8 +47,8 @@ def _outliers(intervals: RestIntervals, arrangement: Arrangement) -> Iterator[st
         inlier = np.concatenate([rest.mean.inlier for rest in interval.rests]) if interval else np.ones(1)
         if interval and (~inlier).mean() > _MANY:
             yield (
-                f"{(~inlier).sum()} of {len(inlier)} frames of '{interval.part}' at rest from {interval.begins:.2f} s on "
-                "are outliers; if the tracker flips it, check the picture for its right pose"
+                f"{(~inlier).sum()} of {len(inlier)} frames of '{interval.part}' at rest from {interval.begins:.2f} s "
+                "on are outliers; if the tracker flips it, check the picture for its right pose"
             )
 
 

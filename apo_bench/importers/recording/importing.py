@@ -81,7 +81,7 @@ def import_recording(
         require(known, f"{file}: '{part}' never rests; give a log in which it lies still at its places.")
     arrange_log = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     arrangement, tracks = _arrange_identical(tracks, intervals, arrange_log, identical, file)
-    check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
+    other = check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
     chosen = arrangement.order.intervals
@@ -112,7 +112,7 @@ def import_recording(
         sharing = tuple(np.flatnonzero(observed).tolist())
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
-    doubts = list_doubts(intervals, arrangement, covariance, assembly)
+    doubts = (*other, *list_doubts(intervals, arrangement, covariance, assembly))
     return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, doubts)
 
 

@@ -322,7 +322,7 @@ def _read_motion_capture(
 
 
 def _complete_rotation(column: LogColumn | None, columns: Sequence[LogColumn | None]) -> LogColumn | None:
-    """Return a column with the meaning of its rotation: a quaternion, which has a w, Euler angles or a rotation vector."""
+    """Return a column with the meaning of its rotation: a quaternion (with w), Euler angles or a rotation vector."""
     if column is None or column.meaning not in (*QUATERNION, *ROTATION_VECTOR):
         return column
     own = {each.meaning for each in columns if each is not None and each.of == column.of}

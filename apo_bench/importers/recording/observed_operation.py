@@ -69,8 +69,7 @@ def observed_operation(
     }
     # What moves a part before its own operations have ended is no error of where they left it.
     placed = assembly.fixed | {part for earlier in assembly.operations[:k] for part in earlier.moves}
-    others = {part: pose.log(pose.inverse(T) @ after[part]) for part, T in before.items() if part in placed}
-    adjusted = {
-        part: twist for part, twist in others.items() if part not in carried and part != operation.main and twist.any()
-    }
+    placed = placed & before.keys() - {operation.main, *carried}
+    twists = {part: pose.log(pose.inverse(before[part]) @ after[part]) for part in sorted(placed)}
+    adjusted = {part: twist for part, twist in twists.items() if twist.any()}
     return LoggedOperation(interval, rest, path, carried, adjusted)

@@ -48,13 +48,13 @@ def summary_lines(
     frames = sum(len(rest.mean.inlier) for rest in known)
     outliers = frames - sum(int(rest.mean.inlier.sum()) for rest in known)
     size_m, size_rad = np.max([per_axis(rest.mean.scatter) for rest in known], axis=0) if known else (0.0, 0.0)
-    noise = f"{frames} frames, {outliers} outliers, a frame deviates by up to {1e3 * size_m:.2f} mm {np.degrees(size_rad):.2f} deg"
+    deviation = f"{1e3 * size_m:.2f} mm {np.degrees(size_rad):.2f} deg"
     return [
         ("read", f"{log.file}: {size}; {'; '.join(log.notes)}"),
         ("frames", "; ".join([*done, *matched.notes]) or "all used as they are"),
         ("camera", _camera_text(camera)),
         ("placed", ", ".join(rests)),
-        ("rests", noise),
+        ("rests", f"{frames} frames, {outliers} outliers, a frame deviates by up to {deviation}"),
     ]
 
 

@@ -102,7 +102,7 @@ def sort_rows(file: str, rows: LogRows, broken: int = 0) -> Log:
         if len(at) and back.max() > _BACK_S:
             place = rows.places[at[int(np.argmax(back))]]
             raise InputError(
-                f"{place}: the time of '{one_line(name, 60)}' runs backwards by {back.max():.3g} s; give one recording, "
+                f"{place}: the time of '{one_line(name, 60)}' runs backwards by {back.max():.3g} s; give one log, "
                 "in the order in which it was recorded."
             )
         at = at[np.argsort(rows.t[at], kind="stable")]
