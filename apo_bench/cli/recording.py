@@ -22,7 +22,7 @@ _HELP = """
 Logs of pose trackers.
 
 Examples:
-  apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
+  apo-bench recording import log.csv --camera camera.toml --objects objects.toml --out seen.csv
   apo-bench correct stick_in_tower --observation seen.csv
 """
 commands = make_group("recording", _HELP)
@@ -34,6 +34,9 @@ def recording_import(
     camera: Annotated[Path, make_path_option("Conventions of the log, and pose of its camera: .toml.")],
     objects: Annotated[Path, make_path_option("Part and frame of each id: .toml.")],
     out: Annotated[Path, make_path_option("Write the observation: .json, or .csv without starts and covariances.")],
+    form: Annotated[
+        str, typer.Option("--format", help="Format that the log must have, such as csv or tum; default: what it holds.")
+    ] = "auto",
     scenario: Annotated[str | None, typer.Option(help="Scenario of the recording; .json needs one.")] = None,
     operation_ends: Annotated[
         str | None, typer.Option(help="End of each operation in s, with commas, where the log is ambiguous.")
@@ -45,8 +48,8 @@ def recording_import(
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations.
 
     Examples:
-      apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
-      apo-bench recording import log.csv --format csv --camera c.toml --objects o.toml --scenario dovetail --out s.json
+      apo-bench recording import log.csv --camera camera.toml --objects objects.toml --out seen.csv
+      apo-bench recording import log.csv --camera c.toml --objects o.toml --scenario dovetail --out s.json
     """
     from apo_bench import load_scenario
     from apo_bench.importers.recording.camera_file import read_camera
@@ -67,7 +70,7 @@ def recording_import(
     solids = {} if task is None else task.assembly.solids
     stated = read_camera(camera)
     named = merge_tags(read_objects(objects), solids)
-    read = read_log(log, stated.conventions)
+    read = read_log(log, stated.conventions, form)
     matched = match_tracks(read, named, solids)
     if task is None:
         lines, doubts = _import_alone(read, stated, matched, out, picture)

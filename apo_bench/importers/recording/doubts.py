@@ -44,8 +44,10 @@ def _not_observed(arrangement: Arrangement, assembly: Assembly) -> Iterator[str]
 def _outliers(intervals: RestIntervals, arrangement: Arrangement) -> Iterator[str]:
     """Yield a sentence for each placed part of whose frames at rest many are wrong."""
     for interval in arrangement.order.intervals:
-        inlier = np.concatenate([rest.mean.inlier for rest in interval.rests]) if interval else np.ones(1)
-        if interval and (~inlier).mean() > _MANY:
+        if interval is None:
+            continue
+        inlier = np.concatenate([rest.mean.inlier for rest in interval.rests])
+        if (~inlier).mean() > _MANY:
             yield (
                 f"{(~inlier).sum()} of {len(inlier)} frames of '{interval.part}' at rest from {interval.begins:.2f} s "
                 "on are outliers; if the tracker flips it, check the picture for its right pose"

@@ -109,7 +109,7 @@ def are_alike(a: Solid, b: Solid) -> bool:
     if len(a.pieces) != len(b.pieces):
         return False
     corners = [np.sort(np.concatenate([piece.corners for piece in solid.pieces]).round(6), axis=0) for solid in (a, b)]
-    return corners[0].shape == corners[1].shape and bool(np.allclose(*corners, atol=1e-5))
+    return corners[0].shape == corners[1].shape and bool(np.abs(corners[0] - corners[1]).max() < 1e-5)
 
 
 def turn_between(solid: Solid | None, T: Array, other: Array) -> Array:

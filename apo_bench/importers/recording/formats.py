@@ -1,12 +1,13 @@
 """Read a log, or a folder of logs, into tracks; what stands in a file is recognised from its content."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.errors import require
+from apo_bench.errors import require, require_known
 from apo_bench.importers.recording.camera_file import Conventions
 from apo_bench.importers.recording.log_columns import MATRIX, LogColumn
 from apo_bench.importers.recording.log_json import read_json_tables
@@ -14,13 +15,37 @@ from apo_bench.importers.recording.log_poses import orient, read_rows
 from apo_bench.importers.recording.log_tables import LogTable, read_text_tables
 from apo_bench.importers.recording.tracks import Log, LogRows, sort_rows
 
+_TABLES = ("a table", "columns", "positions", "times", "TUM", "KITTI", "EuRoC", "BOP", "Motive", "Vicon", "ros2")
+FORMATS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "auto": (),
+        "csv": _TABLES,
+        "tum": ("TUM",),
+        "kitti": ("KITTI",),
+        "euroc": ("EuRoC", "a table"),
+        "bop": ("BOP", "JSON"),
+        "motive": ("Motive",),
+        "vicon": ("Vicon",),
+        "plotjuggler": ("a table",),
+        "ros-csv": ("ros2", "a table", "columns"),
+        "ros-json": ("JSON",),
+        "json": ("JSON",),
+        "foundationpose": ("a matrix", "matrices"),
+        "megapose": ("JSON",),
+        "apriltag": ("JSON",),
+    }
+)
+"""Name of a format -> beginnings of what files are recognised as."""
 _SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat", ".log", ".json", ".jsonl", ".npy")  # of logs in a folder
 _MATRIX_FOLDER = "ob_in_cam"  # in which FoundationPose writes one matrix for each image
 _NO_NAMES = (_MATRIX_FOLDER, "pose", "poses")  # folders that name no object
 
 
-def read_log(path: str | Path, how: Conventions) -> Log:
+def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
     """Read a log, or a folder with one log per object or per image.
+
+    Args:
+        form: One of `FORMATS`; the log is read as its content demands, and must then be of this format.
 
     Returns:
         Tracks in metres and right-handed axes, camera from model.
@@ -28,10 +53,13 @@ def read_log(path: str | Path, how: Conventions) -> Log:
     Raises:
         InputError: A file holds no poses that are understood; the message names the line.
     """
+    require_known("format", form, FORMATS)
     path = Path(path)
     files = _list_files(path) if path.is_dir() else [path]
     require(files, f"{path}: the folder holds no log; give a folder with one log for each object or image.")
     tables = [table for file in files for table in _read_file(file, how)]
+    found = next((table.form for table in tables if form != "auto" and not table.form.startswith(FORMATS[form])), None)
+    require(found is None, f"{path}: this is {found}, not the format '{form}'; leave out --format.")
     if len(files) > 1:
         tables = _name_by_folder(tables)
     logs = [read_rows(table, how) for table in tables if table.rows]

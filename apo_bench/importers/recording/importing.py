@@ -96,8 +96,8 @@ def import_recording(
             poses[k] = X @ rest.T
             covariance[k] = rest.mean.covariance + rest_error(camera, rest.mean)
             for offset in (offsets or {}).get(assembly.operations[k].main, ()):
-                share = np.mean((offset.t >= rest.begins) & (offset.t <= rest.ends)) * len(offset.t)
-                covariance[k] += min(1.0, share / len(rest.mean.inlier)) ** 2 * offset.covariance
+                frames = int(np.sum((offset.t >= rest.begins) & (offset.t <= rest.ends)))
+                covariance[k] += min(1.0, frames / len(rest.mean.inlier)) ** 2 * offset.covariance
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
@@ -137,8 +137,8 @@ def _arrange_identical(
             failed = failed or error
     if not tried:
         raise InputError(f"{file}: {failed}") from failed
-    arrangement, own = min(tried, key=lambda each: each[0].wrong_mm)
-    return arrangement, {part: tracks[other] for part, other in own.items()}
+    arrangement, best = min(tried, key=lambda each: each[0].wrong_mm)
+    return arrangement, {part: tracks[other] for part, other in best.items()}
 
 
 def planned_starts(scenario: Scenario) -> Poses:

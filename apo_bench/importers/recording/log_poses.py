@@ -20,6 +20,7 @@ _LARGEST = 1e20  # of any number in a log
 _LENGTH_TOLERANCE = 0.02
 """The norm of a quaternion, an axis or a row of a matrix may differ from 1 by this."""
 _NO = ("0", "0.0", "false", "no", "n", "f", "lost", "none", "")  # cells of a column such as `valid` for a lost frame
+_EMPTY = ("", "nan", "none", "null")  # cells of a frame without a pose
 _FEWEST_GOOD = 0.5
 """Least share of the cells of a column that are numbers, and of rotations that are rotations."""
 
@@ -100,9 +101,7 @@ def _numbers(cells: Sequence[Any], table: LogTable, column: LogColumn) -> Array:
     """Return the cells of a column as numbers, (n,), NaN where they are none; most of them must be numbers or empty."""
     numbers = np.array([_number(cell) for cell in cells])
     numbers[~(np.abs(numbers) <= _LARGEST)] = np.nan
-    words = [
-        i for i in np.flatnonzero(np.isnan(numbers)) if str(cells[i]).strip().lower() not in ("", "nan", "none", "null")
-    ]
+    words = [i for i, cell in enumerate(cells) if np.isnan(numbers[i]) and str(cell).strip().lower() not in _EMPTY]
     if len(words) > (1.0 - _FEWEST_GOOD) * len(cells):
         given = one_line(str(cells[words[0]]), 40)
         raise InputError(f"{table.places[words[0]]}, column {column.meaning}: a number is needed, '{given}' was given.")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from apo_bench.errors import InputError, one_line, require
-from apo_bench.geometry import Array, Solid, pose
+from apo_bench.geometry import Array, Ints, Solid, pose
 from apo_bench.importers.recording.averaging import average, per_axis
 from apo_bench.importers.recording.folding import are_alike, fold_track, list_images, turn_between
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart
@@ -134,7 +134,7 @@ def list_choices(identical: Sequence[Sequence[str]]) -> Sequence[Mapping[str, st
     return ways[:_MOST_CHOICES]
 
 
-def follow_parts(t: Array, T: Array, labels: Array | None, k: int, solid: Solid | None) -> Array:
+def follow_parts(t: Array, T: Array, labels: Ints | None, k: int, solid: Solid | None) -> Ints:
     """Return which of k identical parts each pose is of, (n,), -1 for none.
 
     The poses of one image are assigned to the last poses of the parts by least distance, where no distance counts for
@@ -172,7 +172,7 @@ def follow_parts(t: Array, T: Array, labels: Array | None, k: int, solid: Solid 
     return own
 
 
-def _one_for_each(at: Array, labels: Array) -> Array:
+def _one_for_each(at: Ints, labels: Ints) -> Ints:
     """Return the last index of each label among indices."""
     return np.array(sorted({int(labels[i]): int(i) for i in at}.values()))
 
@@ -197,7 +197,10 @@ def _undo_swaps(
             if are_alike(solids[group[0]], solids[part])
             and np.allclose(objects.parts[group[0]].T_model_part, objects.parts[part].T_model_part, atol=1e-5)
         ]
-        (same[0] if same else groups.append([]) or groups[-1]).append(part)
+        if same:
+            same[0].append(part)
+        else:
+            groups.append([part])
     notes = []
     for group in (group for group in groups if len(group) > 1):
         t = np.concatenate([tracks[part].t for part in group])

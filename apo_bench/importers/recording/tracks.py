@@ -134,7 +134,7 @@ def best_poses(candidates: Candidates) -> PoseTrack:
     return PoseTrack(t, candidates.T[order][first])
 
 
-def _drop_lost(t: Array, T: Array, lost: NDArray[np.bool_]) -> tuple[Array, Mapping[str, int]]:
+def _drop_lost(t: Array, T: Array, lost: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Mapping[str, int]]:
     """Return the indices of valid frames of one id, and how many of each kind were left out.
 
     Trackers mark lost frames in many ways: no numbers, a column, a position of zero, one pose that recurs exactly, or
@@ -157,7 +157,7 @@ def _drop_lost(t: Array, T: Array, lost: NDArray[np.bool_]) -> tuple[Array, Mapp
             counts["one pose again and again"] = int(recurs.sum())
             counts["the last pose again"] = int((same & ~recurs).sum())
             kept = kept[~recurs & ~same]
-    return kept, {kind: n for kind, n in counts.items() if n}
+    return kept.astype(np.int64), {kind: n for kind, n in counts.items() if n}
 
 
 def _find_recurring(flat: Array, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -168,11 +168,6 @@ def _find_recurring(flat: Array, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
     jumped = np.linalg.norm(np.diff(flat[:, 3::4], axis=0, prepend=flat[:1, 3::4]), axis=1) > _JUMP_M
     recurring = [k for k in np.unique(key[starts]) if np.sum(jumped[starts] & (key[starts] == k)) >= _RECURS]
     return np.isin(key, recurring)
-
-
-def select(track: PoseTrack, kept: NDArray[np.bool_] | Array) -> PoseTrack:
-    """Return the frames of a track that a mask or indices select."""
-    return PoseTrack(track.t[kept], track.T[kept])
 
 
 def span_of(track: PoseTrack) -> float:
