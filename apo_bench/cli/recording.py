@@ -35,7 +35,7 @@ def recording_import(
     objects: Annotated[Path, make_path_option("Part and frame of each id: .toml.")],
     out: Annotated[Path, make_path_option("Write the observation: .json, or .csv without starts and covariances.")],
     form: Annotated[
-        str, typer.Option("--format", help="Format that the log must have, such as csv or tum; default: what it holds.")
+        str, typer.Option("--format", help="Expected format, such as csv or tum; the content decides.")
     ] = "auto",
     scenario: Annotated[str | None, typer.Option(help="Scenario of the recording; .json needs one.")] = None,
     operation_ends: Annotated[

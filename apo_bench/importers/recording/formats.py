@@ -45,7 +45,7 @@ def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
     """Read a log, or a folder with one log per object or per image.
 
     Args:
-        form: One of `FORMATS`; the log is read as its content demands, and must then be of this format.
+        form: One of `FORMATS`; the log is read as its content demands, and a note says if that is another one.
 
     Returns:
         Tracks in metres and right-handed axes, camera from model.
@@ -58,8 +58,7 @@ def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
     files = _list_files(path) if path.is_dir() else [path]
     require(files, f"{path}: the folder holds no log; give a folder with one log for each object or image.")
     tables = [table for file in files for table in _read_file(file, how)]
-    found = next((table.form for table in tables if form != "auto" and not table.form.startswith(FORMATS[form])), None)
-    require(found is None, f"{path}: this is {found}, not the format '{form}'; leave out --format.")
+    others = {table.form for table in tables if form != "auto" and not table.form.startswith(FORMATS[form])}
     if len(files) > 1:
         tables = _name_by_folder(tables)
     logs = [read_rows(table, how) for table in tables if table.rows]
@@ -72,7 +71,11 @@ def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
         lost=np.concatenate([log.lost for log in logs]),
         score=np.concatenate([log.score for log in logs]),
         places=[*chain(*(log.places for log in logs))],
-        notes=[*dict.fromkeys(chain(*(log.notes for log in logs))), *more],
+        notes=[
+            *dict.fromkeys(chain(*(log.notes for log in logs))),
+            *more,
+            *([f"not {form}, as stated"] if others else []),
+        ],
     )
     return sort_rows(str(path), rows, sum(table.broken for table in tables))
 

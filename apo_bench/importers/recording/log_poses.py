@@ -128,7 +128,7 @@ def _one_scene(table: LogTable, cells: dict[str, Array], how: Conventions) -> di
             f"{', '.join(f'{x:.0f}' for x in scenes[:6].tolist())}; state `scene` in the camera file.",
         )
         kept = cells["scene"] == scene
-    return {**{name: x[kept] for name, x in cells.items()}, "kept": kept}
+    return {**{name: x[kept] for name, x in cells.items()}, "kept": kept.astype(np.float64)}
 
 
 def _length_unit(
@@ -200,7 +200,7 @@ def _read_rotations(
     """Return rotation matrices, (n, 3, 3), which rows hold one, (n,), and a note on the convention that was used."""
     names = next(names for names in log_columns.ROTATIONS if cells.keys() >= {*names})
     values = np.column_stack([cells[name] * _angle_unit(table, given[name], how) for name in names])
-    finite = np.isfinite(values).all(axis=1)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     values = np.where(finite[:, None], values, 0.0)
     if names == log_columns.MATRIX:
         R = values.reshape(-1, 3, 3)
