@@ -116,7 +116,7 @@ def _import_for_scenario(
         write_csv(paths, PATH_HEAD, path_rows(imported))
     placed = list(zip(mains, rests, strict=True))
     _draw(f"{log.file}, {task.name}", imported.tracks, found, placed, picture)
-    return summary_lines(log, matched, imported.folded, found, placed), imported.doubts
+    return summary_lines(log, matched, imported.folded, imported.gross, found, placed), imported.doubts
 
 
 def _import_alone(log: Any, camera: Any, matched: Any, out: Path, picture: Path | None) -> Any:
@@ -136,7 +136,7 @@ def _import_alone(log: Any, camera: Any, matched: Any, out: Path, picture: Path 
         for k, placement in enumerate(recording.placements, start=1)
         if placement.carries
     ]
-    return summary_lines(log, matched, {}, recording.camera, placed), together
+    return summary_lines(log, matched, {}, {}, recording.camera, placed), together
 
 
 def _parse_order(ends: str | None, unseen: str | None, operations: int) -> Any:

@@ -1,6 +1,6 @@
 """Arrange a log: find the camera pose, the starts of parts and the order of operations, and how well they fit."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +51,6 @@ class Arrangement(NamedTuple):
     def wrong_mm(self) -> float:
         """The worst misfit of contacts and known places, [mm]; a degree counts like a millimetre."""
         return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
-
-
-Arrange = Callable[[RestIntervals], Arrangement]
-"""Function that arranges rest intervals with the same camera file, scenario and statements."""
 
 
 def arrange(
@@ -147,11 +143,19 @@ def _image_as_in_contact(
         begins = known.index(interval)
         t = end_of_operation(assembly, intervals, order.intervals, k)
         reached = {**start, **{other: X @ T for other, T in find_rest_poses(changed, t).items()}}
-        turns = find_symmetries(assembly.solids[part])
-        wrong = [contact_fit(assembly, k, {**reached, part: reached[part] @ g}).wrong_mm for g in turns]
-        best = int(np.argmin(wrong))
-        if wrong[best] < wrong[0] - _OTHER_IMAGE_MM:
-            changed[part] = (*changed[part][:begins], *(each.turn(turns[best]) for each in changed[part][begins:]))
+        # The part itself, and if it fits at none of its images, each part that it touches.
+        beside = sorted({contact.environment.part for contact in assembly.operations[k].contacts} & changed.keys())
+        for other in (part, *beside):
+            turns = find_symmetries(assembly.solids[other])
+            wrong = [contact_fit(assembly, k, {**reached, other: reached[other] @ g}).wrong_mm for g in turns]
+            best = int(np.argmin(wrong))
+            if wrong[best] < wrong[0] - _OTHER_IMAGE_MM:
+                first = begins if other == part else 0
+                turned = [each.turn(turns[best]) for each in changed[other][first:]]
+                changed[other] = (*changed[other][:first], *turned)
+                reached = {**reached, other: reached[other] @ turns[best]}
+            if min(wrong) < _OTHER_IMAGE_MM:
+                break
     return intervals if changed == dict(intervals) else changed
 
 

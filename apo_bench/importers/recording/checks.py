@@ -8,13 +8,14 @@ import numpy as np
 from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.arrangement import Arrange, Arrangement
+from apo_bench.importers.recording.arrangement import Arrangement
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.log_poses import mirror
 from apo_bench.importers.recording.observed_operation import LoggedOperation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, describe_moves
 from apo_bench.importers.recording.rest_intervals import RestIntervals, is_near
+from apo_bench.importers.recording.tracks import PoseTrack
 
 _FITS_MM = 20.0
 """A larger misfit of a contact or of a known place cannot be noise; a degree counts like a millimetre."""
@@ -29,15 +30,19 @@ _FAR = 5.0
 
 
 def check_arrangement(
-    arrangement: Arrangement, arrange: Arrange, intervals: RestIntervals, models: Mapping[str, Array], file: str
+    arrangement: Arrangement,
+    arrange_tracks: Callable[[Mapping[str, PoseTrack]], Arrangement],
+    tracks: Mapping[str, PoseTrack],
+    models: Mapping[str, Array],
+    file: str,
 ) -> tuple[str, ...]:
     """Return a sentence on another convention of the log if all fits clearly better with it.
 
     Args:
-        arrange: Function that arranges rest intervals again, for other conventions.
-        intervals: The rest intervals as read.
-        file: Name of the log, for messages.
+        arrange_tracks: Function that arranges tracks again, for other conventions.
+        tracks: The tracks as read, camera from part.
         models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; the identity if missing.
+        file: Name of the log, for messages.
 
     Raises:
         InputError: Contacts are far open.
@@ -49,7 +54,7 @@ def check_arrangement(
     remedy = ""
     for key, change in _other_conventions():
         try:
-            other = arrange(_change_models(intervals, models, change)).wrong_mm
+            other = arrange_tracks(_change_models(tracks, models, change)).wrong_mm
         except (NoMatchingOrder, np.linalg.LinAlgError):
             continue
         if other < best:
@@ -87,22 +92,15 @@ def _scale(T: Array, factor: float) -> Array:
 def _reorder(T: Array, shift: int) -> Array:
     """Return the pose with the numbers of its quaternion shifted cyclically, as if read in the other order."""
     packed = pose.pack(T)
-    return np.asarray(pose.unpack(np.concatenate([packed[:3], np.roll(packed[3:], shift)])))
+    return np.asarray(pose.unpack(np.concatenate([packed[..., :3], np.roll(packed[..., 3:], shift, axis=-1)], axis=-1)))
 
 
 def _change_models(
-    intervals: RestIntervals, models: Mapping[str, Array], change: Callable[[Array], Array]
-) -> RestIntervals:
-    """Return the intervals with the poses of models changed; poses of parts are converted to models and back."""
-    changed = {}
-    for part, known in intervals.items():
-        M = models.get(part, np.eye(4))
-
-        def change_part(T: Array, M: Array = M) -> Array:
-            return change(T @ pose.inverse(M)) @ M
-
-        changed[part] = tuple(interval.change(change_part) for interval in known)
-    return changed
+    tracks: Mapping[str, PoseTrack], models: Mapping[str, Array], change: Callable[[Array], Array]
+) -> Mapping[str, PoseTrack]:
+    """Return the tracks with the poses of models changed; poses of parts are converted to models and back."""
+    M = {part: models.get(part, np.eye(4)) for part in tracks}
+    return {part: PoseTrack(t, change(T @ pose.inverse(M[part])) @ M[part]) for part, (t, T) in tracks.items()}
 
 
 def check_moved(

@@ -15,6 +15,9 @@ from apo_bench.importers.recording.tracks import PoseTrack
 
 _BEFORE = 5
 """A pose is folded to the one of so many poses before it from which the others are turned least."""
+_AROUND = 4  # frames before and after one that tell whether it is gross
+_GROSS_M = 0.03  # smallest distance of a gross frame
+_M_PER_RAD = 0.03  # a turn by a radian counts like this distance
 _TURNED = np.cos(np.radians(3.0))
 """A pose counts as folded if its image is turned by more than this, as a cosine."""
 
@@ -25,6 +28,26 @@ class FoldedTrack(NamedTuple):
     track: PoseTrack
     turned: NDArray[np.bool_]
     """(n,), frames with another image than most frames; about an axis of revolution, those turned by 3 degrees."""
+
+
+def find_gross(track: PoseTrack, solid: Solid) -> NDArray[np.bool_]:
+    """Return which frames, (n,), are far from the frames around them (Hampel filter); images count as one pose.
+
+    A frame is gross if it is farther than 30 mm, where a radian counts like 30 mm, and than four times the median
+    distance of the frames around, from the one among them that is nearest to all.
+    """
+    n = len(track.t)
+    if n < 2 * _AROUND + 1:
+        return np.zeros(n, dtype=np.bool_)
+    window = np.clip(np.arange(n)[:, None] + np.arange(-_AROUND, _AROUND + 1), 0, n - 1)
+    T = track.T[window]
+    p = T[:, :, :3, 3]
+    apart = np.linalg.norm(p[:, :, None] - p[:, None], axis=-1)
+    apart = apart + _M_PER_RAD * turn_between(solid, T[:, :, None], T[:, None])
+    middle = np.median(apart, axis=2).argmin(axis=1)
+    rows = np.arange(n)
+    usual = np.median(apart[rows, middle], axis=1)
+    return np.asarray(apart[rows, middle, _AROUND] > np.maximum(_GROSS_M, 4.0 * usual))
 
 
 def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:

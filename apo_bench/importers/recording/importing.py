@@ -1,8 +1,7 @@
 """Import the tracks of a log as the observation of one demonstration of a scenario."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import final
 
 import numpy as np
@@ -10,12 +9,12 @@ import numpy as np
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
-from apo_bench.importers.recording.arrangement import Arrange, Arrangement, arrange
+from apo_bench.importers.recording.arrangement import Arrangement, arrange
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
-from apo_bench.importers.recording.folding import fold_track
+from apo_bench.importers.recording.folding import find_gross, fold_track
 from apo_bench.importers.recording.matching import TagOffset, list_choices
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
@@ -23,6 +22,8 @@ from apo_bench.importers.recording.rest_intervals import RestIntervals, find_all
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.perception.observation.models import UNSEEN_DEVIATION, add_shared_error, find_last_seen, floor_covariance
 from apo_bench.scenario import Scenario, place_layout
+
+_MANY = 0.25  # share of gross frames of a part that is doubtful
 
 
 @final
@@ -40,6 +41,8 @@ class ImportedRecording:
     """Folded track of each part, camera from part."""
     folded: Mapping[str, int]
     """Part -> number of frames folded to another image than most."""
+    gross: Mapping[str, int]
+    """Part -> number of frames that were left out, as they are far from the frames around."""
     doubts: tuple[str, ...]
     """What may be wrong with the recording, one sentence each."""
 
@@ -74,14 +77,30 @@ def import_recording(
             operation.main in tracks,
             f"{file}: '{operation.main}', which operation {k} moves, is not tracked; name its id in the objects file.",
         )
+    planned = planned_starts(scenario)
+    gross = {part: find_gross(track, assembly.solids[part]) for part, track in tracks.items()}
+    tracks = {part: PoseTrack(t[~gross[part]], T[~gross[part]]) for part, (t, T) in tracks.items()}
+
+    def arrange_log(intervals: RestIntervals) -> Arrangement:
+        return arrange(intervals, camera, assembly, planned, stated)
+
+    def arrange_tracks(tracks: Mapping[str, PoseTrack]) -> Arrangement:
+        folded = {part: fold_track(track, assembly.solids[part]).track for part, track in tracks.items()}
+        intervals = find_all_intervals(folded, assembly.solids)
+        if not all(intervals.values()):
+            raise NoMatchingOrder("a part never rests.")
+        return _arrange_identical(intervals, arrange_log, identical)[0]
+
     folded = {part: fold_track(track, assembly.solids[part]) for part, track in tracks.items()}
-    tracks = {part: each.track for part, each in folded.items()}
-    intervals = find_all_intervals(tracks, assembly.solids)
+    intervals = find_all_intervals({part: each.track for part, each in folded.items()}, assembly.solids)
     for part, known in intervals.items():
         require(known, f"{file}: '{part}' never rests; give a log in which it lies still at its places.")
-    arrange_log = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
-    arrangement, tracks = _arrange_identical(tracks, intervals, arrange_log, identical, file)
-    other = check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
+    try:
+        arrangement, owned = _arrange_identical(intervals, arrange_log, identical)
+    except NoMatchingOrder as error:
+        raise InputError(f"{file}: {error}") from error
+    other = check_arrangement(arrangement, arrange_tracks, tracks, models or {}, file)
+    tracks = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
     chosen = arrangement.order.intervals
@@ -112,18 +131,22 @@ def import_recording(
         sharing = tuple(np.flatnonzero(observed).tolist())
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
-    doubts = (*other, *list_doubts(intervals, arrangement, covariance, assembly))
-    return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, doubts)
+    wrong = {part: int(each.sum()) for part, each in gross.items()}
+    many = tuple(
+        f"{n} of {n + len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
+        for part, n in wrong.items()
+        if n > _MANY * (n + len(tracks[part].t))
+    )
+    doubts = (*other, *many, *list_doubts(intervals, arrangement, covariance, assembly))
+    return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, wrong, doubts)
 
 
 def _arrange_identical(
-    tracks: Mapping[str, PoseTrack],
     intervals: RestIntervals,
-    arrange_log: Arrange,
+    arrange_log: Callable[[RestIntervals], Arrangement],
     identical: Sequence[Sequence[str]],
-    file: str,
-) -> tuple[Arrangement, Mapping[str, PoseTrack]]:
-    """Return the best arrangement, and its tracks, of all ways in which identical parts may have their tracks."""
+) -> tuple[Arrangement, Mapping[str, str]]:
+    """Return the best arrangement of all ways in which identical parts may have their tracks, and part -> track."""
     tried: list[tuple[Arrangement, Mapping[str, str]]] = []
     failed: NoMatchingOrder | None = None
     for way in list_choices(identical):
@@ -136,9 +159,8 @@ def _arrange_identical(
         except NoMatchingOrder as error:
             failed = failed or error
     if not tried:
-        raise InputError(f"{file}: {failed}") from failed
-    arrangement, best = min(tried, key=lambda each: each[0].wrong_mm)
-    return arrangement, {part: tracks[other] for part, other in best.items()}
+        raise failed or NoMatchingOrder("the moves of the log are not the operations of the scenario.")
+    return min(tried, key=lambda each: each[0].wrong_mm)
 
 
 def planned_starts(scenario: Scenario) -> Poses:

@@ -217,7 +217,8 @@ def _read_unnamed(
     texts = [i for i, cell in enumerate(first[:12]) if cell and not _is_number(cell)]
     if texts in ([2], [2, 3]) and len(first) >= 10 and first[0].isdigit() and first[1].isdigit():
         # sec, nanosec, frame_id, perhaps child_frame_id, then the pose; a covariance may follow.
-        names = ["sec", "nanosec", "", *["id"] * (len(texts) - 1), *_POSE]
+        is_named = len(texts) == 2 or len(first) == 4 + len(_POSE)  # a child_frame_id may be a number
+        names = ["sec", "nanosec", "", *["id"] * is_named, *_POSE]
         known = [*_understand(path, names, {}), *[None] * (len(first) - len(names))]
         return [_collect(path, "ros2 topic echo --csv", known, lines, separator)]
     if all(map(_is_number, first)):

@@ -14,7 +14,9 @@ from apo_bench.importers.recording.folding import are_alike, fold_track, list_im
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart
 from apo_bench.importers.recording.tracks import Log, PoseTrack, best_poses, span_of
 
-_GATE_M = 0.05  # a pose farther from the last one of a track is no continuation
+_GATE_M = 0.05  # a pose farther from the last one of a part is none of it at first
+_FASTEST_M_S = 1.5  # speed of a part, by which it may be farther
+_FORGET_S = 0.3  # longest time for which the speed counts
 _M_PER_RAD = 0.03  # a turn by a radian counts like this distance
 _SWITCH_M = 0.008  # cost of another id than before
 _MOST_CHOICES = 120  # ways in which identical parts are told apart, at most
@@ -147,29 +149,41 @@ def follow_parts(t: Array, T: Array, labels: Ints | None, k: int, solid: Solid |
     """
     own = np.full(len(t), -1)
     last = np.full((k, 4, 4), np.nan)
+    seen = np.zeros(k)  # time of the last pose, [s]
+    unsure = np.full(k, -1)  # a pose that was too far away, until the next one is near it
     named = np.arange(k)
     span = span_of(PoseTrack(np.unique(t), np.zeros((0, 4, 4))))
     images = np.cumsum(np.concatenate([[0], np.diff(t) > (0.5 * span if labels is not None else 1e-9)]))
-    for image in range(images[-1] + 1):
-        at = (
-            np.flatnonzero(images == image)
-            if labels is None
-            else _one_for_each(np.flatnonzero(images == image), labels)
-        )
+    for at in np.split(np.arange(len(t)), np.flatnonzero(np.diff(images)) + 1):
+        if labels is not None:
+            at = _one_for_each(at, labels)
         known = ~np.isnan(last[:, 0, 0])
-        cost = np.full((k, len(at)), _GATE_M)
+        gate = _GATE_M + _FASTEST_M_S * np.minimum(t[at[0]] - seen, _FORGET_S)
+        off = np.full((k, len(at)), _GATE_M)
         if known.any():
-            off = np.linalg.norm(last[known][:, None, :3, 3] - T[at][None, :, :3, 3], axis=-1)
-            off = off + _M_PER_RAD * turn_between(solid, last[known][:, None], T[at][None])
-            cost[known] = np.minimum(off, _GATE_M) + 1e-3 * off
+            off[known] = _distances(solid, last[known][:, None], T[at][None])
+        cost = np.minimum(off, gate[:, None]) + 1e-3 * off
         if labels is not None:
             cost = cost + _SWITCH_M * (named[:, None] != labels[None, at])
-        rows, columns = linear_sum_assignment(cost)
-        own[at[columns]] = rows
-        last[rows] = T[at[columns]]
-        if labels is not None:
-            named[rows] = labels[at[columns]]
+        for row, column in zip(*linear_sum_assignment(cost), strict=True):
+            i = int(at[column])
+            far = known[row] and off[row, column] > gate[row]
+            if far and not (unsure[row] >= 0 and _distances(solid, T[unsure[row]], T[i]) < gate[row]):
+                unsure[row] = i
+                own[i] = -1 if labels is None else row
+                continue
+            if far:
+                own[unsure[row]] = row
+            own[i], last[row], seen[row], unsure[row] = row, T[i], t[i], -1
+            if labels is not None:
+                named[row] = labels[i]
     return own
+
+
+def _distances(solid: Solid | None, T: Array, other: Array) -> Array:
+    """Return distances between poses, [m], where a turn between their images counts too; poses broadcast."""
+    off = np.linalg.norm(T[..., :3, 3] - other[..., :3, 3], axis=-1)
+    return np.asarray(off + _M_PER_RAD * turn_between(solid, T, other))
 
 
 def _one_for_each(at: Ints, labels: Ints) -> Ints:

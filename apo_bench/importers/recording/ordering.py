@@ -22,9 +22,10 @@ _WIDE_MM = 50.0  # misfit beyond which a contact is not worse
 """The worth of an interval is its seconds, up to 1, less 1 for each 10 mm of misfit, up to 5."""
 _LEFT_OVER = 5.0
 """Penalty for each interval that no operation explains."""
+_LOST_S = 0.5  # a part that is seen at rest no more this long before the end of the log was lost, or not put down
 _SKIPPED = 8.0
 """Penalty for an operation that nobody saw, as its part was hidden."""
-_OVERLAP_S = 0.3
+_OVERLAP_S = 0.5
 """An operation may take its part this much earlier than the part of the previous operation comes to rest."""
 _CLOSE = 0.3
 """A second choice whose worth differs by less is a rival."""
@@ -153,9 +154,9 @@ def _best_choices(
                     value = choice.worth + worth(k, interval) - _LEFT_OVER * amiss
                     longer = _Choice(value, max(choice.begins, interval.came), (*choice.intervals, interval))
                     by_end.setdefault(interval, []).append(longer)
-        if any(
-            interval.gone > interval.ends or interval.came < interval.begins for interval in intervals[operation.main]
-        ):
+        own = intervals[operation.main]
+        is_lost = own[-1].ends < max(known[-1].ends for known in intervals.values()) - _LOST_S
+        if is_lost or any(each.gone > each.ends or each.came < each.begins for each in own):
             # The part may have come to rest and gone again while it was hidden.
             skipped = [_Choice(c.worth - _SKIPPED, c.begins, (*c.intervals, None)) for c in choices]
             choices = [*(each for ending in by_end.values() for each in _best_two(ending)), *_best_two(skipped)]

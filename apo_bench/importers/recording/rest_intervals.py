@@ -1,6 +1,6 @@
 """Group rests between which a part is only adjusted into one interval at one place."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -50,11 +50,6 @@ class RestInterval:
     def at(self, t: float) -> Rest:
         """Return the last rest that begins at or before a time, [s]; the first rest if there is none."""
         return next((rest for rest in reversed(self.rests) if rest.begins <= t), self.rests[0])
-
-    def change(self, change: Callable[[Array], Array]) -> "RestInterval":
-        """Return the interval with `change` applied to the pose of each rest, (4, 4)."""
-        rests = [replace(rest, mean=replace(rest.mean, T=change(rest.T))) for rest in self.rests]
-        return replace(self, rests=tuple(rests))
 
     def turn(self, g: Array) -> "RestInterval":
         """Return the interval with the image T g in place of each pose T."""

@@ -25,6 +25,7 @@ def summary_lines(
     log: Log,
     matched: MatchedTracks,
     folded: Mapping[str, int],
+    gross: Mapping[str, int],
     camera: CameraPose,
     placed: Sequence[tuple[str, Rest | None]],
 ) -> list[tuple[str, str]]:
@@ -32,6 +33,7 @@ def summary_lines(
 
     Args:
         folded: Part -> number of frames folded to another image.
+        gross: Part -> number of frames left out, as they are far from the frames around.
         placed: Part and rest of each operation.
     """
     times = [poses.t for poses in log.candidates.values()]
@@ -39,6 +41,7 @@ def summary_lines(
     size = f"{len(log.candidates)} ids, {sum(map(len, times))} poses, {seconds:.1f} s"
     lost = {**matched.lost, **({"broken rows": log.broken} if log.broken else {})}
     done = [f"{n} of {part} folded to the nearest image under its symmetry" for part, n in folded.items() if n]
+    done += [f"{n} of {part} left out (far from the frames around)" for part, n in gross.items() if n]
     done += [f"{n} left out ({kind})" for kind, n in lost.items()]
     rests = [
         f"{part} not observed" if rest is None else f"{part} {rest.begins:.2f} to {rest.ends:.2f} s"
