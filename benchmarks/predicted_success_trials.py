@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 from apo_bench.assembly import Observation
 from apo_bench.records import TrialConfig
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import explanations, plan_score
 from apo_bench.trial.run import noise_of, run_trial
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     SimulatedDemonstration,
     draw_robot_error,
     observe_demonstration,

@@ -51,11 +51,14 @@ def scenario_list() -> None:
       apo-bench scenario list
       apo-bench run generated:17 --seed 3
     """
-    from apo_bench import load_scenario
-    from apo_bench.scenario.file import list_scenario_names
+    from apo_bench.io import read_typed
+    from apo_bench.scenario.scenario_file import find_scenario_path, list_scenario_names
+    from apo_bench.scenario.tables import ScenarioTable
 
-    loaded = map(load_scenario, list_scenario_names())
-    rows = [(each.name, str(len(each.assembly)), each.title, each.paper) for each in loaded]
+    tables = {
+        name: read_typed(find_scenario_path(name), ScenarioTable, "scenario file") for name in list_scenario_names()
+    }
+    rows = [(name, str(len(table.operations)), table.title, table.paper) for name, table in tables.items()]
     print_columns([("scenario", "operations", "title", "paper"), *rows])
 
 
@@ -114,7 +117,7 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
-    from apo_bench.importers.assembly.writing import choice_lines
+    from apo_bench.importers.assembly.scenario_writer import choice_lines
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     names = [name.strip() for name in order.split(",")] if order else []
@@ -147,7 +150,7 @@ def scenario_check(
       apo-bench scenario check own.toml
       apo-bench scenario check own.toml --arm ur5e_primitive --seeds 20
     """
-    from apo_bench.importers.assembly.checking import check_file
+    from apo_bench.importers.assembly.scenario_check import check_file
 
     check("fidelity", fidelity)
     passed = True

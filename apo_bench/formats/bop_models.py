@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.formats.bop import LARGEST_MM
-from apo_bench.geometry import Array, make_turn, pose
+from apo_bench.geometry import Array, make_rotation_about_axis, pose
 from apo_bench.io import convert_typed, read_typed
 
 LARGEST_MODELS_BYTES = 64_000_000
@@ -68,7 +68,12 @@ def read_symmetries(path: str | Path) -> Mapping[int, ObjectSymmetry]:
             if not length > 0.0:
                 raise InputError(f"{path}, {name}, symmetries_continuous: an axis that is not zero is needed.")
             axis = np.array(each.axis) / length
-            turns = np.array([make_turn(np.array(each.offset), axis, angle) for angle in np.radians(np.arange(_TURNS))])
+            turns = np.array(
+                [
+                    make_rotation_about_axis(np.array(each.offset), axis, angle)
+                    for angle in np.radians(np.arange(_TURNS))
+                ]
+            )
             images = (images[:, None] @ turns[None]).reshape(-1, 4, 4)
         if len(images) > 1 and name.isdigit():
             found[int(name)] = ObjectSymmetry(images)

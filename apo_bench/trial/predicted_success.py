@@ -23,13 +23,13 @@ from scipy.special import ndtr, ndtri
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, compute_placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.finished import least_overlaps
-from apo_bench.planning.prediction.measures import (
+from apo_bench.judging.finished_assembly import compute_least_overlaps
+from apo_bench.planning.prediction.plan_measures import (
     ArmMove,
     DrawnMeasure,
     Measure,
-    drawn_measures,
-    measures,
+    measure_drawn_plans,
+    measure_plan,
 )
 from apo_bench.records import NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
@@ -162,13 +162,14 @@ def plan_score(
 def _by_arm(
     plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
 ) -> tuple[tuple[Poses, ...], tuple[ArmMove, ...]]:
-    """Poses of parts placed by robots with drawn errors, as `drawn_measures` takes them, and the motions of the arm.
+    """Poses of parts placed by robots with drawn errors, as `measure_drawn_plans` takes them, and the motions of the
+    arm.
 
     The poses are empty if the robot has no errors, or if a pose is out of reach.
     """
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought, left_after_feeling, stack_errors
-    from apo_bench.trial.stages import robot_error_of
+    from apo_bench.trial.trial_stages import robot_error_of
 
     arm = arm_moves(plan, scene, spiral)
     slip = parse_robot_error(robot_error).in_hand
@@ -254,12 +255,12 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
     # per operation, for `_within`
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     lengths = where.clearance_mm, scenario.thresholds
-    planned = measures(plan, *lengths, scenario.attach, arm=arm)
+    planned = measure_plan(plan, *lengths, scenario.attach, arm=arm)
     # With drawn robots only stability comes from the plan itself; the other measures are drawn.
     stands = np.prod([_within(each, less_mm) for each in planned if each.kind in _WEIGHED or not ends])
     if not ends:
         return float(stands)
-    drawn = drawn_measures(plan, *lengths, scenario.attach, arm, ends)
+    drawn = measure_drawn_plans(plan, *lengths, scenario.attach, arm, ends)
     return float(stands * np.array([_within(each, less_mm) for each in drawn]).prod(axis=0).mean())
 
 
@@ -282,7 +283,7 @@ def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
         truths: From `draw_truths`, (count, n, 4, 4).
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
-    overlaps = least_overlaps(
+    overlaps = compute_least_overlaps(
         plan.assembly, compute_placements(plan.assembly, plan.start, plan.target_poses)[-1], truths
     )
     possible = overlaps[np.isfinite(overlaps)]  # without truths in which faces do not meet

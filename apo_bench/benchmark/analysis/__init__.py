@@ -7,6 +7,7 @@ from apo_bench.benchmark.analysis.condition import (
     format_noise_label,
     get_condition,
     group_by_condition,
+    make_settings_key,
     make_sort_key,
     rank_method,
 )
@@ -14,7 +15,12 @@ from apo_bench.benchmark.analysis.detection import tabulate_detection
 from apo_bench.benchmark.analysis.effort import tabulate_effort
 from apo_bench.benchmark.analysis.gaps import tabulate_gaps
 from apo_bench.benchmark.analysis.half_level import HalfLevel
-from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.number_text import (
+    format_percent,
+    format_percent_interval,
+    format_points,
+    format_signed,
+)
 from apo_bench.benchmark.analysis.over_seeds import (
     FEWEST_SEEDS,
     Contrast,
@@ -45,8 +51,8 @@ from apo_bench.benchmark.analysis.settings import (
     list_settings,
 )
 from apo_bench.benchmark.analysis.summary import Summary, summarise
+from apo_bench.benchmark.analysis.table_line import ALL, Line
 from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
-from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
 
 __all__ = (
     "ALL",
@@ -82,6 +88,7 @@ __all__ = (
     "group_by_setting",
     "list_levels",
     "list_settings",
+    "make_settings_key",
     "make_sort_key",
     "pool_rate",
     "rank_method",

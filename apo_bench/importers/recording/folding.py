@@ -10,7 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Solid, find_nearest_alike, find_revolution, find_symmetries, make_turn, pose
+from apo_bench.geometry import (
+    Array,
+    Solid,
+    find_nearest_equivalent_pose,
+    find_revolution,
+    find_symmetries,
+    make_rotation_about_axis,
+    pose,
+)
 from apo_bench.importers.recording.tracks import PoseTrack
 
 _BEFORE = 5
@@ -69,7 +77,7 @@ def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:
         before = R[max(0, i - _BEFORE) : i]
         near = before[np.einsum("aij,bij->ab", before, before).sum(axis=1).argmax()]
         if is_round:
-            T[i] = find_nearest_alike(solid, track.T[i], near)
+            T[i] = find_nearest_equivalent_pose(solid, track.T[i], near)
             R[i] = T[i, :3, :3]
         else:
             images = track.T[i, :3, :3] @ S
@@ -95,7 +103,7 @@ def list_images(solid: Solid, T: Array, turns: int = 1) -> Array:
     if about is None:
         return np.asarray(images)
     angles = 2.0 * np.pi * np.arange(turns) / turns
-    return np.concatenate([images @ make_turn(about.point, about.axis, angle) for angle in angles])
+    return np.concatenate([images @ make_rotation_about_axis(about.point, about.axis, angle) for angle in angles])
 
 
 def free_twist(solid: Solid) -> Array | None:
@@ -106,7 +114,7 @@ def free_twist(solid: Solid) -> Array | None:
 
 def fold_to(solid: Solid, T: Array, expected: Array) -> Array:
     """Return the image of a pose T that is turned least from an expected pose, (4, 4)."""
-    return np.asarray(find_nearest_alike(solid, T, expected))
+    return np.asarray(find_nearest_equivalent_pose(solid, T, expected))
 
 
 def forget_turn(solid: Solid, C: Array) -> Array:

@@ -111,8 +111,5 @@ def test_an_id_that_is_no_part_and_a_part_without_its_id_are_named(tmp_path: Pat
     assert [*matched.tracks] == ["peg"]
     assert "the id 3 of 'hole' is not in the log" in matched.doubts
     assert matched.doubts[1].startswith("the id 'c' is no part, so its 1 poses")
-        "the id 3 of 'hole' is not in the log",
-        "the id 'c' is no part",
-    ]
     with pytest.raises(InputError, match="its ids are 'a', 'c'"):
         match_tracks(log, ObjectsFile("o.toml", {"peg": TrackedPart(("x",), np.eye(4), {})}, frozenset()), {})
