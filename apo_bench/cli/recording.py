@@ -90,7 +90,7 @@ def _import_for_scenario(
     from apo_bench.formats.observation_json import observation_form
     from apo_bench.importers.recording.drawing import draw_recording
     from apo_bench.importers.recording.importing import import_recording
-    from apo_bench.importers.recording.text import PATH_HEAD, path_rows, summary_lines
+    from apo_bench.importers.recording.text import PATH_HEAD, describe_recording, path_rows
 
     out, picture, paths = files
     try:
@@ -116,13 +116,13 @@ def _import_for_scenario(
         write_csv(paths, PATH_HEAD, path_rows(imported))
     placed = list(zip(mains, rests, strict=True))
     _draw(f"{log.file}, {task.name}", imported.tracks, found, placed, picture)
-    return summary_lines(log, matched, imported.folded, imported.gross, found, placed), imported.doubts
+    return describe_recording(log, matched, imported.folded, imported.gross, found, placed), imported.doubts
 
 
 def _import_alone(log: Any, camera: Any, matched: Any, out: Path, picture: Path | None) -> Any:
     """Write the poses of a recording without a scenario, and return lines on what was done and doubts."""
     from apo_bench.importers.recording.camera_pose import rest_error
-    from apo_bench.importers.recording.text import summary_lines
+    from apo_bench.importers.recording.text import describe_recording
     from apo_bench.importers.recording.unplanned import unplanned_recording
 
     recording = unplanned_recording(matched.tracks, camera, log.file)
@@ -136,7 +136,7 @@ def _import_alone(log: Any, camera: Any, matched: Any, out: Path, picture: Path 
         for k, placement in enumerate(recording.placements, start=1)
         if placement.carries
     ]
-    return summary_lines(log, matched, {}, {}, recording.camera, placed), together
+    return describe_recording(log, matched, {}, {}, recording.camera, placed), together
 
 
 def _parse_order(ends: str | None, unseen: str | None, operations: int) -> Any:

@@ -24,6 +24,7 @@ from apo_bench.importers.recording.tracks import PoseTrack
 _BEFORE = 5
 """A pose is folded to the one of so many poses before it from which the others are turned least."""
 _AROUND = 4  # frames before and after one that tell whether it is gross
+_FEW = 0.03  # a smaller share of gross frames is left to the robust means of rests
 _GROSS_M = 0.03  # smallest distance of a gross frame
 _M_PER_RAD = 0.03  # a turn by a radian counts like this distance
 _TURNED = np.cos(np.radians(3.0))
@@ -55,7 +56,8 @@ def find_gross(track: PoseTrack, solid: Solid) -> NDArray[np.bool_]:
     middle = np.median(apart, axis=2).argmin(axis=1)
     rows = np.arange(n)
     usual = np.median(apart[rows, middle], axis=1)
-    return np.asarray(apart[rows, middle, _AROUND] > np.maximum(_GROSS_M, 4.0 * usual))
+    gross = apart[rows, middle, _AROUND] > np.maximum(_GROSS_M, 4.0 * usual)
+    return np.asarray(gross & (gross.mean() > _FEW))
 
 
 def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:

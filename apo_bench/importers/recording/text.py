@@ -21,7 +21,7 @@ _POSE_UNITS = copy_frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """Factors from a packed pose, [m], to mm."""
 
 
-def summary_lines(
+def describe_recording(
     log: Log,
     matched: MatchedTracks,
     folded: Mapping[str, int],
