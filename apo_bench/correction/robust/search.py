@@ -267,7 +267,8 @@ class Search:
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
             for i, now in enumerate(state):
                 # Of several views of an operation that is in doubt the one that is assumed may be the false one.
-                if now == DISPLACED or set(state) == {INLIER}:
+                # Of two exchanged views none is changed alone.
+                if now == DISPLACED or now < 0 or set(state) == {INLIER}:
                     continue
                 blank = change_states(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
                 yield blank
