@@ -17,18 +17,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import imageio.v3 as imageio
-import numpy as np
-
-from apo_bench.assembly import compute_placements
 from apo_bench.benchmark.analysis import Rate
 from apo_bench.importers.assembly.checking import check_file
-from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.records import TrialConfig
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.render import aim_camera, draw_picture
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of, simulate_demonstration
 from benchmarks.generated import FAMILIES, generated, scenario_of
@@ -37,7 +30,6 @@ from benchmarks.rates_by_condition import counted
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "generated.csv"
 PAGE = ROOT / "docs" / "results" / "generated.md"
-PICTURE = ROOT / "docs" / "pictures" / "generated.png"
 FIRST = "<!-- rates -->"
 LAST = "<!-- end of rates -->"
 COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
@@ -64,7 +56,6 @@ def main() -> None:
             csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(line)
         print(*line.values(), flush=True)
     keep(read_lines(rows))
-    draw([given.folder / f"generated_{k}" / f"generated_{k}.toml" for k in range(len(FAMILIES))])
 
 
 def run(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -> Iterator[Line]:
@@ -122,19 +113,6 @@ def keep(lines: Sequence[Line]) -> None:
     before, rest = PAGE.read_text(encoding="utf-8").split(FIRST)
     PAGE.write_text(f"{before}{FIRST}\n\n{tables(lines)}\n\n{LAST}{rest.split(LAST)[1]}", encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
-
-
-def draw(paths: Sequence[Path]) -> None:
-    """Draw the assemblies side by side, every part at its nominal pose."""
-    views = []
-    for path in paths:
-        scene = build_scene(load_scenario(path))
-        scenario = scene.scenario
-        poses = compute_placements(scenario.assembly, scenario.start, scenario.nominal_poses)[-1]
-        middle = np.mean([poses[part][:3, 3] for part in scenario.assembly.fixed if part != TABLE], axis=0)
-        view = aim_camera(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
-        views.append(draw_picture(scene, poses, 300, 260, view))
-    imageio.imwrite(PICTURE, np.concatenate(views, axis=1))
 
 
 def tables(lines: Sequence[Line]) -> str:

@@ -104,7 +104,7 @@ def caption(summary: Summary) -> str:
     return (
         f"*Success in {len(plain)} tasks of the paper, {seeds} seeds each, with 95 % intervals. Noise is a standard "
         "deviation per axis (1 mm and 1 degree in both panels of limits); clearance of 0.25 mm per side; no human "
-        "error but in the table. Lines that coincide lie on each other, the thinner on the wider.*"
+        "error except in the table. Where lines coincide, the thinner one is above the wider one.*"
     )
 
 

@@ -1,8 +1,11 @@
-"""Draw finished assemblies, of every scenario and of every generated family: `python docs/gallery.py` (a minute)."""
+"""Draw finished assemblies: all scenarios, generated families, imported CAD: `python docs/gallery.py` (two minutes)."""
 
 from __future__ import annotations
 
+import sys
+import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from apo_bench.assembly import Assembly, compute_placements
 from apo_bench.formats.kit import make_part_mesh
 from apo_bench.geometry import Array, Solid, build_union_mesh, shrink_pieces
@@ -26,9 +31,11 @@ from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene.render import aim_camera
+from benchmarks import generated as imported
 
 SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
 GENERATED = SHEET.with_name("generated_grid.png")
+IMPORTED = SHEET.with_name("generated.png")
 SIZE = (1200, 960)  # rendered at this size, and reduced on the sheet
 SEED = 1  # of generated assemblies
 AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, where not 128
@@ -36,12 +43,26 @@ ELEVATION_DEG = -34.0
 FILLED = 0.86  # share of the picture that the assembly fills, in width or height
 TABLE = (0.76, 0.72, 0.67)
 STEEL = (0.55, 0.57, 0.60)  # of parts without a colour
+PALETTE = plt.colormaps["tab10"].colors  # of movable parts, where the scenario was imported and has no colours
 
 
 def main() -> None:
     draw_sheet({name: load_scenario(name) for name in list_scenario_names()}, 5, SHEET)
     generated = {family: load_scenario(f"generated:{family}:{SEED}") for family in FAMILIES}
     draw_sheet(generated, 4, GENERATED)
+    with tempfile.TemporaryDirectory() as folder:
+        draw_sheet(
+            {family.__name__: import_assembly(seed, Path(folder)) for seed, family in enumerate(imported.FAMILIES)},
+            5,
+            IMPORTED,
+        )
+
+
+def import_assembly(seed: int, folder: Path) -> Scenario:
+    """Import an assembly of random dimensions from its part files, and give its movable parts colours."""
+    scenario = load_scenario(imported.scenario_of(seed, folder / str(seed)))
+    parts = [part for part in scenario.assembly.solids if part not in scenario.assembly.fixed]
+    return replace(scenario, colors={part: PALETTE[k % len(PALETTE)] for k, part in enumerate(parts)})
 
 
 def draw_sheet(scenarios: Mapping[str, Scenario], columns: int, path: Path) -> None:

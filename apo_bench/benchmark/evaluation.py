@@ -37,7 +37,8 @@ def evaluate(
         method: Methods by name or as functions; a mapping gives them labels. A function takes an `Observation` and
             returns a `Correction`, or poses (n, 4, 4) in the world frame, [m].
         seeds: Trials of each combination.
-        workers: Processes; 1 runs the trials in this process, as functions of a notebook and lambdas need.
+        workers: Processes; 1 runs the trials in this process, as functions of a notebook and lambdas need. A script
+            with more of them calls `evaluate` under `if __name__ == "__main__":`.
         save: Folder of the records, as `apo-bench sweep` writes it; the same call continues an interrupted run.
             Default: a temporary folder.
         settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ... A
@@ -62,7 +63,7 @@ def evaluate(
         ...     fidelity="near-contact",
         ... )
         >>> [(row["method"], row["trials"]) for row in table.rows]
-        [('contact', 1), ('mine', 1)]
+        [('mine', 1), ('contact', 1)]
     """
     for name in settings:
         require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))
@@ -95,7 +96,7 @@ def evaluate(
         folder = Path(temporary.name if temporary else save or "")
         records = run_sweep(grid, folder, workers=None if workers == 1 else workers)
     labels = {called[label]: label for label in called}
-    return RateTable(tuple(_relabel(record, labels) for record in records), folder, temporary)
+    return RateTable(tuple(_relabel(record, labels) for record in records), folder, tuple(labelled), temporary)
 
 
 def _scenario_source(scenario: str | Path | Scenario) -> str:
@@ -125,7 +126,13 @@ def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
     pairs = [
         (each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__), each) for each in several
     ]
-    return [(f"{kind}_{i}" if label == "<lambda>" else label, each) for i, (label, each) in enumerate(pairs, start=1)]
+    named = [(f"{kind}_{i}" if label == "<lambda>" else label, each) for i, (label, each) in enumerate(pairs, start=1)]
+    for label, each in named:
+        require(
+            dict(named)[label] is each or dict(named)[label] == each,
+            f"several functions are named '{label}'; give labels, as in {kind}={{'first': ..., 'second': ...}}.",
+        )
+    return named
 
 
 def _relabel(record: TrialRecord, labels: Mapping[str, str]) -> TrialRecord:

@@ -1,5 +1,6 @@
 """The table that `evaluate` returns: success rates by condition, with exports and plots."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, final
 
 from apo_bench.errors import missing_package, require
+from apo_bench.io import format_count
 from apo_bench.records import TrialRecord
 
 RUN_FILES = ("run.json", "trials.jsonl", "timing.jsonl")
@@ -26,6 +28,8 @@ class RateTable:
     """The record of each trial; methods have the labels that the caller gave."""
     folder: Path
     """The folder with the records, as `apo-bench sweep` writes them."""
+    methods: tuple[str, ...] = ()
+    """Labels of the methods in the order of the caller, which the rows have."""
     _temporary: TemporaryDirectory[str] | None = None  # keeps a temporary folder as long as the table exists
 
     @property
@@ -36,10 +40,11 @@ class RateTable:
         return [{column.name: column.of(item) for column in named} for item in table.items]
 
     def __str__(self) -> str:
-        """The table as text with aligned columns."""
+        """The table as text with aligned columns, and the error of each method that raised one."""
         table = self._table()
         words = [column.words for column in table.shown]
-        return "\n".join(_align([[column.head for column in table.shown], *table.lines], words))
+        lines = _align([[column.head for column in table.shown], *table.lines], words)
+        return "\n".join((*lines, *self._describe_errors()))
 
     def to_pandas(self) -> Any:
         """Return the rows as a `pandas.DataFrame`.
@@ -94,12 +99,22 @@ class RateTable:
                 copyfile(self.folder / name, target / name)
         return target
 
+    def _describe_errors(self) -> Iterable[str]:
+        """Yield a sentence for each method that raised an error, or returned what is no correction."""
+        raised = [record for record in self.records if record["failure_code"] == "raised"]
+        first = {record["method"]: record["sentence"] for record in reversed(raised)}
+        counts = Counter(record["method"] for record in raised)
+        for method, sentence in first.items():
+            yield f"{method} has an error in {format_count(counts[method], 'trial')}, the first: {sentence}"
+
     def _table(self) -> Any:
-        """Return the table of conditions that a report has, too."""
-        from apo_bench.benchmark.analysis import tally
+        """Return the table of conditions that a report has, too, with methods in the order of the caller."""
+        from apo_bench.benchmark.analysis import make_settings_key, tally
         from apo_bench.benchmark.report.tables.conditions import condition_table
 
-        return condition_table(tally(self.records))
+        ranks = {method: rank for rank, method in enumerate(self.methods)}
+        by_method = sorted(tally(self.records), key=lambda cell: ranks.get(cell.method, len(ranks)))
+        return condition_table(sorted(by_method, key=make_settings_key))
 
 
 def _align(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:

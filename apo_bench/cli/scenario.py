@@ -51,11 +51,14 @@ def scenario_list() -> None:
       apo-bench scenario list
       apo-bench run generated:17 --seed 3
     """
-    from apo_bench import load_scenario
-    from apo_bench.scenario.file import list_scenario_names
+    from apo_bench.io import read_typed
+    from apo_bench.scenario.file import find_scenario_path, list_scenario_names
+    from apo_bench.scenario.tables import ScenarioTable
 
-    loaded = map(load_scenario, list_scenario_names())
-    rows = [(each.name, str(len(each.assembly)), each.title, each.paper) for each in loaded]
+    tables = {
+        name: read_typed(find_scenario_path(name), ScenarioTable, "scenario file") for name in list_scenario_names()
+    }
+    rows = [(name, str(len(table.operations)), table.title, table.paper) for name, table in tables.items()]
     print_columns([("scenario", "operations", "title", "paper"), *rows])
 
 

@@ -37,7 +37,8 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
             gets it, and that method is called in place of the corrector; any other gets nothing.
 
     Returns:
-        Poses, status and test; check `ok` before you execute them.
+        Poses, status and test; check `ok` before you execute them. If a corrector returns numbers that are not finite,
+        the status is `not_finite` and the poses are those observed.
 
     Raises:
         InputError: There is no such corrector, or the observation is inconsistent.

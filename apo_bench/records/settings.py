@@ -96,7 +96,6 @@ class TrialConfig:
             key=True,
             drawn=True,
             axis=True,
-            swept=(0.0, 1.0),
         ),
     )
     """Factor on the human error that the scenario states: 0 is an ideal human."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,12 +29,39 @@ def table() -> apo_bench.RateTable:
 
 def test_each_condition_has_a_row(table: apo_bench.RateTable) -> None:
     assert [(row["method"], row["noise_mm"], row["trials"]) for row in table.rows] == [
-        *[("uncorrected", level, 1) for level in (0.5, 2.0)],
         *[("mine", level, 1) for level in (0.5, 2.0)],
+        *[("uncorrected", level, 1) for level in (0.5, 2.0)],
     ]
     assert all(row["low_95"] <= row["rate"] <= row["high_95"] for row in table.rows)
     assert "mine" in str(table)
     assert list(table.to_pandas()["successes"]) == [row["successes"] for row in table.rows]
+
+
+def test_the_error_of_a_method_stands_below_the_table() -> None:
+    methods = {"short": lambda observation: observation.poses[:1], "uncorrected": "uncorrected"}
+    text = str(apo_bench.evaluate(methods, scenario="block_on_block", **QUICK))
+    assert "short has an error in 1 trial, the first: " in text
+    assert "(1, 4, 4)" in text.splitlines()[-1]
+
+
+def test_functions_of_one_name_need_labels() -> None:
+    functions = [lambda observation, k=k: observation.poses for k in range(2)]
+    for function in functions:
+        function.__name__ = "mine"
+    with pytest.raises(apo_bench.InputError, match="several functions are named 'mine'"):
+        apo_bench.evaluate(functions, scenario="block_on_block", **QUICK)
+
+
+def test_a_script_without_a_guard_is_told_about_it_once(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import apo_bench\n"
+        "apo_bench.evaluate('uncorrected', scenario='block_on_block', fidelity='near-contact', seeds=2, workers=2)\n"
+    )
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert ended.returncode == 1
+    assert ended.stderr.count("RuntimeError: ") == 1
+    assert "__main__" in ended.stderr.splitlines()[-1]
 
 
 def test_a_function_that_returns_the_observed_poses_is_the_method_uncorrected(table: apo_bench.RateTable) -> None:

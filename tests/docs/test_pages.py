@@ -150,7 +150,7 @@ def same_output(printed: str, shown: str, within: float = 0.02) -> bool:
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners, tracking, tests."""
+    """But for contact equations, quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners, tracking, tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
@@ -163,6 +163,7 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     }
     assert sum(map(len, code.values())) > 10
     assert inner == {
+        "apo_bench.assembly",
         "apo_bench.correction.calibration",
         "apo_bench.benchmark.datasets",
         "apo_bench.envs",

@@ -7,6 +7,7 @@ from apo_bench.benchmark.analysis.condition import (
     format_noise_label,
     get_condition,
     group_by_condition,
+    make_settings_key,
     make_sort_key,
     rank_method,
 )
@@ -82,6 +83,7 @@ __all__ = (
     "group_by_setting",
     "list_levels",
     "list_settings",
+    "make_settings_key",
     "make_sort_key",
     "pool_rate",
     "rank_method",

@@ -130,12 +130,14 @@ def rank_contact_source(contact_source: str) -> tuple[int, str]:
 
 def make_sort_key(c: Condition) -> tuple[Any, ...]:
     """Return the sort key of a condition: setting, with defaults first; then method; then noise level."""
+    return (*make_settings_key(c), rank_method(c.method), c.method, c.noise_mm, c.noise_deg)
+
+
+def make_settings_key(c: Condition) -> tuple[Any, ...]:
+    """Return the sort key of what a condition sets apart from method and noise level."""
     others = ((getattr(c, name) != SETTINGS[name].default, getattr(c, name)) for name in _OTHERS)
     noise = (c.noise != USUAL, c.noise, rank_contact_source(c.contact_source))
-    return (
-        *(c.scenario, c.clearance_mm, noise, c.human_error_scale, *others),
-        *(rank_method(c.method), c.method, c.noise_mm, c.noise_deg),
-    )
+    return (c.scenario, c.clearance_mm, noise, c.human_error_scale, *others)
 
 
 def get_condition(record: Mapping[str, Any]) -> Condition | None:

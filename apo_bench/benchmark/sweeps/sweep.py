@@ -1,5 +1,6 @@
 """Run sweeps, and continue interrupted ones."""
 
+import multiprocessing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -90,6 +91,8 @@ def run_sweep(
         >>> [record["success"] for record in apo_bench.run_sweep(grid, tempfile.mkdtemp())]
         [True]
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing asks itself
+        raise SystemExit(1)  # a worker imports a script without `if __name__ == "__main__":`; the first process says so
     grids = (grids,) if isinstance(grids, SweepConfig) else tuple(grids)
     _check_executor(workers, limit_s, backend, address)
     check_grids(grids)
