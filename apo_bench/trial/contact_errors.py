@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from scipy.special import ndtr
@@ -112,7 +112,7 @@ class ContactError(NamedTuple):
     """Whether these parts do touch there."""
 
 
-def share_within(room_mm: Array, slack_mm: float) -> Array:
+def share_within(room_mm: Array | float, slack_mm: float) -> Array:
     """Probability that what is neglected stays within this room, any shape.
 
     Args:
@@ -169,7 +169,7 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
     belief = Belief(assembly, believed.start, space.poses, reach @ reach.T)
     standing = set(assembly.fixed)
     known = {relation.contact for relation in assembly.relations()}
-    bounds = {"gap_m": _RULES.gap_m, "angle_rad": _RULES.angle_rad, "share": _RULES.share}
+    bounds: Any = {"gap_m": _RULES.gap_m, "angle_rad": _RULES.angle_rad, "share": _RULES.share}
     for k, operation in enumerate(assembly.operations):
         now = belief.standing(k)
         for a in operation.moves:
@@ -189,7 +189,7 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
                     # likelihood of a closed pair over that of one anywhere within the bounds
                     scaled = 2.0 * np.pi * S / (2.0 * _RULES.gap_m) ** 2
                     likely = -0.5 * float(e @ np.linalg.solve(S, e) + np.linalg.slogdet(scaled)[1])
-                    off = np.linalg.norm(e)
+                    off = np.asarray(np.linalg.norm(e))
                     accepted = judged.accepts(assembly, k, found.contact, now.poses, space.poses[k], off)
                     yield ContactError(k, found.contact, likely - math.log(len(known) + 1), float(accepted))
         standing |= set(operation.moves)

@@ -218,8 +218,8 @@ class SolvedHypothesis:
         return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
-def test_as_chosen(solved: SolvedHypothesis) -> Consistency | None:
-    """The test of a hypothesis without the directions that it chose freely; None if errors with tails have no such test.
+def retest_as_chosen(solved: SolvedHypothesis) -> Consistency | None:
+    """The test of a hypothesis without the directions that it chose freely; None for errors with tails.
 
     A view that is too near or too far, seen badly, or displaced with others may be off by any amount, so what explains
     that amount is no evidence. Of chi-square its share in these directions is subtracted, and their number of the
