@@ -168,7 +168,7 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
     reach = space.twists.reshape(6 * n, -1)
     belief = Belief(assembly, believed.start, space.poses, reach @ reach.T)
     standing = set(assembly.fixed)
-    known = {relation.contact for relation in assembly.relations()}
+    count = len(assembly.relations())
     bounds: Any = {"gap_m": _RULES.gap_m, "angle_rad": _RULES.angle_rad, "share": _RULES.share}
     for k, operation in enumerate(assembly.operations):
         now = belief.standing(k)
@@ -181,7 +181,7 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
                     slope = pair.slope @ J
                     C = slope @ belief.covariance @ slope.T
                     found = judge_pair(believed, _RULES, a, b, now.poses[b], pair, slope, C)
-                    if found is None or found.contact in known:
+                    if found is None or found.contact in operation.contacts:
                         continue
                     m = pair.lengths
                     S = (C + reality(pair, assembly.play(found.contact, believed.play_m)))[:m, :m]
@@ -191,7 +191,7 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
                     likely = -0.5 * float(e @ np.linalg.solve(S, e) + np.linalg.slogdet(scaled)[1])
                     off = np.asarray(np.linalg.norm(e))
                     accepted = judged.accepts(assembly, k, found.contact, now.poses, space.poses[k], off)
-                    yield ContactError(k, found.contact, likely - math.log(len(known) + 1), float(accepted))
+                    yield ContactError(k, found.contact, likely - math.log(count + 1), float(accepted))
         standing |= set(operation.moves)
 
 
