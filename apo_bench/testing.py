@@ -23,7 +23,7 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.keywords import configure_trial
 from apo_bench.trial.run import record_trial
-from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
+from apo_bench.trial.trial_stages import demonstration_of, scene_key, scene_of
 
 _MOST = 100_000
 """Most trials that a test may take; with the usual error it takes some dozens."""

@@ -62,7 +62,7 @@ def no_disappeared(observation: Observation) -> Correction:
     system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(without_lost(observation.assembly), ~(before <= observation.gap_m)[standing])
-    solution = solve_newton(system.among(standing & system.containing(freed)), observation.poses, freed)
+    solution = solve_newton(system.among(standing & system.contacts_with(freed)), observation.poses, freed)
     status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)[standing]), observation.gap_m)
     goals = solution.poses
     if status == "converged":
@@ -112,7 +112,7 @@ def no_history(observation: Observation) -> Correction:
     end = _end(observation.assembly, tuple(last))
     system = build_contact_equations(end, observation.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
-    solution = solve_newton(system.among(system.containing(free)), poses, free)
+    solution = solve_newton(system.among(system.contacts_with(free)), poses, free)
     status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)), observation.gap_m)
     freed = _main(observation.assembly, last, free)
     goals = np.array(observation.poses)

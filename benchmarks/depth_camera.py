@@ -15,9 +15,15 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import list_scenario_names, load_scenario
+from apo_bench.scenario.scenario_file import list_scenario_names, load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream
+from apo_bench.trial.trial_stages import (
+    OBSERVATION,
+    SimulatedDemonstration,
+    range_sensor,
+    simulate_demonstration,
+    stream,
+)
 
 
 class Located(NamedTuple):
@@ -31,7 +37,7 @@ class Located(NamedTuple):
 def locate(scene: Scene, shown: SimulatedDemonstration, noise_level: float, seed: int) -> Iterator[Located | None]:
     """Yield the error of every operation; None where the camera did not locate the part."""
     camera = range_sensor(scene, shown, noise_level)
-    events = camera.events(shown.demonstration, camera.sensed(stream(seed, OBSERVATION)))
+    events = camera.detect_operations(shown.demonstration, camera.add_noise(stream(seed, OBSERVATION)))
     found = {event.operation: event.found for event in events}
     for k, T in enumerate(shown.demonstration.poses):
         part = found.get(k)

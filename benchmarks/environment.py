@@ -16,8 +16,8 @@ from pathlib import Path
 import gymnasium
 
 from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.scenario.file import list_scenario_names
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.scenario.scenario_file import list_scenario_names
+from apo_bench.trial.trial_stages import simulate_demonstration
 from benchmarks.rates_by_condition import table
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed import on_the_table, read_posed
-from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.importers.assembly.posed_parts import on_the_table, read_posed
+from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts.making import (
     Body,
     Frustum,

@@ -18,12 +18,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import Rate
-from apo_bench.importers.assembly.checking import check_file
+from apo_bench.importers.assembly.scenario_check import check_file
 from apo_bench.records import TrialConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.run import run_trial
-from apo_bench.trial.stages import scene_of, simulate_demonstration
+from apo_bench.trial.trial_stages import scene_of, simulate_demonstration
 from benchmarks.generated import FAMILIES, generated, scenario_of
 from benchmarks.rates_by_condition import counted
 

@@ -40,6 +40,7 @@ KEYS = {
     "predicted": "failure_prediction",
     "touches": "probe_contacts",
     "targets": "step_poses",
+    "most": "largest_distance",
     "human_covariance": "human_error_covariance",
 }
 """Attributes, columns of records, keys of observations and of `info`."""

@@ -5,6 +5,8 @@
 Only the drive is simulated: no gravity, the arm stands still. Fingers are what moves; they close along the direction in
 which two groups of them move towards each other. The pads of a group are what reaches farthest. Where each pad pushes
 with less than 10 N, the file states by how much its drive has to be stronger for 20 N.
+
+The file is long because each number of a gripper file has its own measurement, and a benchmark is one script.
 """
 
 import argparse

@@ -19,7 +19,7 @@ import pickle
 from collections.abc import Iterable
 from pathlib import Path
 
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from benchmarks.predicted_success_page import write_page
 from benchmarks.predicted_success_trials import (
     CALIBRATION,

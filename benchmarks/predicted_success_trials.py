@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.records import NO_ROBOT_ERROR, TrialConfig
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import predict_success
 from apo_bench.trial.run import noise_of, run_trial
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     CONTACT_SOURCE,
     SimulatedDemonstration,
     draw_robot_error,

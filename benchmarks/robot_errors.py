@@ -1,109 +1,195 @@
-"""Write what errors of the robot itself cost: `python benchmarks/robot_errors.py FOLDER [FOLDER ...]`.
+"""Measure robot errors, named and unnamed: `python -m benchmarks.robot_errors [--trials 20] [--only ERROR ...]`.
 
-Takes sweeps of benchmarks/robot_errors.toml, whole or not, and writes docs/results/robot-errors.md.
+The package draws named errors, and the robot assumes their standard deviations. Unnamed errors have fixed amounts: the
+simulated robot is changed behind the back of the package, whose robot has no error and assumes usual ones (`unknown`).
+Adds seeds to the counts in results/robot_errors.csv and writes docs/results/robot-errors.md; `--trials 0` only writes.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
+import csv
+from collections.abc import Callable
+from functools import lru_cache, partial
+from itertools import product
 from pathlib import Path
-from statistics import median
+from typing import Any
+from unittest import mock
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import mujoco
+import numpy as np
 
-from apo_bench.records import TrialConfig, TrialRecord
-from benchmarks.provenance import count_revisions, mujoco_of, with_mujoco
-from benchmarks.rates_by_condition import counted, fraction, group, rate_of, read_judged, table
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
+from apo_bench.benchmark.analysis import Rate
+from apo_bench.geometry import pose
+from apo_bench.simulation.robot import RobotError, compute_sag_per_metre
+from apo_bench.trial.trial_stages import SimulatedDemonstration, demonstration_of
+from benchmarks.provenance import with_mujoco
+from benchmarks.rates_by_condition import counted, fraction, table
 
-PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
+ROOT = Path(__file__).resolve().parents[1]
+KEPT = ROOT / "benchmarks" / "results" / "robot_errors.csv"
+PAGE = ROOT / "docs" / "results" / "robot-errors.md"
+SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
+METHODS = ("contact", "contact+probe", "oracle")
+COLUMNS = ("error", "scenario", "method", "trials", "successes")
 HEAD = """\
 # Errors of the robot
 
 With a robot error even `oracle`, which has the true poses, fails, since contacts correct the errors of the camera and
-not those of the robot. A robot that [probes](../how/probing.md) estimates its own error: `contact+probe` succeeds in {}
-trials with one.
+not those of the robot. A robot that [probes](../how/probing.md) estimates its own error.
 """
 MEASURED = """
 ## Measurement
 
-Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it.
-Success: the finished assembly is right; the same seeds, no human error, clearance of 0.25 mm per side, and noise of
-1 mm and 1 degree (1 sigma per axis) for all methods but `oracle`. Every trial draws a
-[robot error](../guide/robot-error.md#errors-of-the-robot), in standard deviations, mm and degrees. The sweeps ran
-with {} revision(s) of the package.
+`python -m benchmarks.robot_errors` writes this page and adds trials to `benchmarks/results/robot_errors.csv`, which
+keeps the counts. Success: the finished assembly is right. All rows have the same seeds, no human error, a clearance of
+0.25 mm per side, and noise of 1 mm and 1 degree (1 sigma per axis). Intervals are Wilson's of 95 %.
+
+Every trial draws its own [named errors](../guide/robot-error.md#errors-of-the-robot), in standard deviations, and the
+robot assumes these. Unnamed errors are fixed: the script changes the simulated robot, and `contact+probe` assumes
+`unknown`. Heights count over the targets; those of an arm that sags grow with its reach.
 """
-SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
-USUAL = {"arm": "six_axis", "ft_sensor": TrialConfig.ft_sensor, "assumed_robot_error": TrialConfig.assumed_robot_error}
+NAMED = (
+    *("none", "hand_eye:1/0.2", "joints:0.05", "tool:0.5", "in_hand:0.5/1"),
+    *("sag:0.7", "base_tilt:0.1", "finger:1", "ft_drift:2"),
+)
+
+
+def droop(scene: Scene, mm: float) -> None:
+    """Leave weight of the arm without compensation, so that the tip hangs lower over the targets."""
+    model = scene.work.model
+    gains = model.actuator_gainprm[[model.actuator(f"arm/{name}").id for name in scene.arm.joints], 0]
+    model.body_gravcomp *= 1.0 - 1e-3 * mm * float((gains * compute_sag_per_metre(scene))[0])
+
+
+def sag(scene: Scene, mm: float) -> dict[str, Any]:
+    """Let the joints yield behind their encoders."""
+    return {"sag": 1e-3 * mm * compute_sag_per_metre(scene)}
+
+
+def tilt(scene: Scene) -> dict[str, Any]:
+    foot = pose.at(scene.arm.base)
+    return {"hand_eye": foot @ pose.at((0.0, 0.0, 0.0), (0.06, 0.08, 0.0)) @ pose.inverse(foot)}
+
+
+def thin_pad(scene: Scene) -> None:
+    """Remove 1 mm of the inner side of one pad."""
+    model = scene.work.model
+    pad = model.geom("arm/left_pad").id
+    model.geom_size[pad, 0] -= 0.0005
+    model.geom_pos[pad, 0] -= 0.0005
+
+
+def friction(scene: Scene, times: float) -> None:
+    scene.work.model.geom_friction[:, 0] *= times
+
+
+def heavier_parts(scene: Scene) -> None:
+    parts = list(scene.work.body.values())
+    scene.work.model.body_mass[parts] *= 1.5
+    scene.work.model.body_inertia[parts] *= 1.5
+
+
+UNNAMED: dict[str, Callable[[Scene], dict[str, Any] | None]] = {
+    **{f"weight not compensated, {mm} mm": partial(droop, mm=mm) for mm in (0.3, 0.7, 1.0)},
+    **{f"joints yield unseen, {mm} mm": partial(sag, mm=mm) for mm in (0.3, 0.7, 1.0)},
+    "base tilted, 0.1 degrees": tilt,
+    "pad 1 mm thinner": thin_pad,
+    "force sensor drifts 2 N in 10 s": lambda _: {"ft_drift": np.array([0.12, 0.0, 0.16, 0.0, 0.01, 0.0])},
+    "friction a third": partial(friction, times=1.0 / 3.0),
+    "friction three times": partial(friction, times=3.0),
+    "tip off, 0.5 mm": lambda _: {"tool": pose.at((0.0003, 0.0003, 0.00026))},
+    "parts 1.5 times as heavy": heavier_parts,
+}
+"""Change of a scene that is made for it, or fields of a `RobotError`."""
+
+
+@lru_cache(maxsize=4)
+def scene_of(scenario: str) -> Scene:
+    return build_scene(load_scenario(scenario), clearance_mm=0.25)
+
+
+@lru_cache(maxsize=4)
+def demonstration(scenario: str, seed: int) -> SimulatedDemonstration:
+    """The demonstration of a seed, in a scene without changes."""
+    return demonstration_of(TrialConfig(scenario, seed=seed, human_error_scale=0.0), scene_of(scenario))
+
+
+def succeeds(error: str, scenario: str, method: str, seed: int) -> bool:
+    """Run one trial."""
+    config = TrialConfig(
+        scenario,
+        method=method,
+        seed=seed,
+        human_error_scale=0.0,
+        clearance_mm=0.25,
+        fidelity="near-contact",
+        robot_error=error if error in NAMED else "none",
+        assumed_robot_error="matched" if error in NAMED else "unknown",
+    )
+    run = partial(run_trial, config, simulated=demonstration(scenario, seed))
+    if error in NAMED:
+        return bool(run(scene_of(scenario))["success"])
+    scene = scene_of.__wrapped__(scenario)  # one of its own, which is changed
+    fields = UNNAMED[error](scene)
+    if fields is None:
+        return bool(run(scene)["success"])
+    none = np.eye(4)
+    right = {"hand_eye": none, "joints": np.zeros(len(scene.arm.joints)), "tool": none}
+    right["in_hand"] = np.tile(none, (len(scene.scenario.assembly), 1, 1))
+    with mock.patch("apo_bench.trial.run.draw_robot_error", return_value=RobotError(**(right | fields))):
+        return bool(run(scene)["success"])
+
+
+def page(rates: dict[tuple[str, ...], Rate]) -> str:
+    """Return the page, with the rates of each error, scenario and method."""
+
+    def over(error: str, method: str) -> Rate:
+        found = [rates[key] for name in SCENARIOS if (key := (error, name, method)) in rates]
+        return Rate(sum(rate.successes for rate in found), sum(rate.trials for rate in found))
+
+    each = [(error, name) for error in (*NAMED, *UNNAMED) for name in SCENARIOS]
+    lines = [HEAD]
+    for title, errors in (("Named errors", NAMED), ("Unnamed errors", tuple(UNNAMED))):
+        rows = [[f"`{e}`" if e in NAMED else e, *(counted(over(e, method)) for method in METHODS)] for e in errors]
+        lines += [f"## {title}\n", *table(("robot error", *(f"`{m}`" for m in METHODS)), rows), ""]
+    rows = [[e, name, *(fraction(rates.get((e, name, method))) for method in METHODS)] for e, name in each]
+    return "\n".join([*lines, "## Each scenario\n", *table(("robot error", "scenario", *METHODS), rows), MEASURED])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="+", type=Path)
-    folders = parser.parse_args().folders
-    written = page(read_judged(folders), count_revisions(folders))
-    PAGE.write_text(with_mujoco(written, mujoco_of(folders)), encoding="utf-8")
+    parser.add_argument("--trials", type=int, default=20, help="seeds of each error, scenario and method")
+    parser.add_argument("--only", nargs="*", default=[*NAMED, *UNNAMED], metavar="ERROR")
+    parser.add_argument("--methods", nargs="*", default=METHODS)
+    given = parser.parse_args()
+    counts = read()
+    for seed, error, scenario, method in product(range(given.trials), given.only, SCENARIOS, given.methods):
+        key = error, scenario, method
+        trials, right = counts.get(key, (0, 0))
+        if trials == seed:
+            counts[key] = trials + 1, right + succeeds(error, scenario, method, seed)
+            write(counts)
+    rates = {key: Rate(right, trials) for key, (trials, right) in counts.items()}
+    PAGE.write_text(with_mujoco(page(rates), [mujoco.__version__]), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
-def page(every: Sequence[TrialRecord], revisions: int) -> str:
-    rows = [row for row in every if _is_usual(row)]
-    methods = sorted({row["method"] for row in rows})
-    errors = sorted({str(row["robot_error"]) for row in rows}, key=_by_size)
-    whole = group(rows, lambda row: (row["robot_error"], row["method"]))
-    each = group(rows, lambda row: (row["robot_error"], row["method"], row["scenario"]))
-    times = group(rows, lambda row: (row["method"], row["scenario"]))
-    probed = rate_of([row for row in rows if row["method"] == "contact+probe" and row["robot_error"] != "none"])
-    heads = [f"`{method}`" for method in methods]
-    lines = [
-        HEAD.format(f"{probed.successes} of {probed.trials}"),
-        "## All scenarios\n",
-        *table(
-            ("robot error", *heads),
-            [[f"`{e}`", *(counted(rate_of(whole.get((e, m), []))) for m in methods)] for e in errors],
-        ),
-        "\n## Each scenario\n",
-        *table(
-            ("scenario", "robot error", *heads),
-            [
-                [scenario, f"`{e}`", *(fraction(rate_of(each.get((e, m, scenario), []))) for m in methods)]
-                for scenario in SCENARIOS
-                for e in errors
-            ],
-        ),
-    ]
-    cost = [[f"`{m}`", *(_median_s(times.get((m, scenario), [])) for scenario in SCENARIOS)] for m in methods]
-    lines += ["\n## Simulated seconds of a trial, median over all errors\n", *table(("method", *SCENARIOS), cost)]
-    others = group([row for row in every if not _is_usual(row)], _other_place)
-    if others:
-        lines += [
-            "\n## Other sensors, assumptions, arms and scenarios\n",
-            "The sensor is `--ft-sensor`, the assumption `--assumed-robot-error`.\n",
-            *table(
-                ("robot error", "arm", "sensor", "assumption", "scenario", "method", "successes"),
-                [[*(f"`{name}`" for name in place), fraction(rate_of(of))] for place, of in sorted(others.items())],
-            ),
-        ]
-    return "\n".join([*lines, MEASURED.format(revisions)])
+def read() -> dict[tuple[str, ...], tuple[int, int]]:
+    """Return the kept trials and successes by error, scenario and method."""
+    if not KEPT.exists():
+        return {}
+    with KEPT.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))[1:]
+    return {tuple(key): (int(trials), int(right)) for *key, trials, right in lines}
 
 
-def _is_usual(row: TrialRecord) -> bool:
-    return row["scenario"] in SCENARIOS and all(row.get(key) == value for key, value in USUAL.items())
-
-
-def _other_place(row: TrialRecord) -> tuple[str, ...]:
-    return tuple(str(row.get(key)) for key in ("robot_error", *USUAL, "scenario", "method"))
-
-
-def _median_s(rows: Sequence[TrialRecord]) -> str:
-    seconds = [row["sim_time_s"] for row in rows if row["sim_time_s"] is not None]
-    return f"{median(seconds):.0f}" if seconds else ""
-
-
-def _by_size(error: str) -> tuple[bool, bool, str, float]:
-    kind, _, size = error.partition("+")[0].partition(":")
-    return kind != "none", "+" in error, kind, float(size.split("/")[0] or 0.0) if size else 0.0
+def write(counts: dict[tuple[str, ...], tuple[int, int]]) -> None:
+    """Keep the counts, in the order of the page."""
+    order = [key for key in product((*NAMED, *UNNAMED), SCENARIOS, METHODS) if key in counts]
+    with KEPT.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *((*key, *counts[key]) for key in order)])
 
 
 if __name__ == "__main__":

@@ -24,13 +24,13 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import Assembly, Demonstration, draw_layout, load_scenario
-from apo_bench.assembly import Meetings, Plan, compute_placements
+from apo_bench.assembly import ContactMeasurements, Plan, compute_placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
-from apo_bench.planning.prediction.failure import predict
+from apo_bench.planning.prediction.first_failure import predict_failure
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.pose_error import goal_errors
 
@@ -67,9 +67,11 @@ def is_right(scenario: Scenario, shown: Demonstration, poses: Array) -> bool:
         return False
     for operation, placed in zip(assembly.operations, compute_placements(assembly, shown.start, poses), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))
-        if not all(Meetings(assembly).measure_overlaps((contact, placed) for contact in flat)):
+        if not all(ContactMeasurements(assembly).measure_overlaps((contact, placed) for contact in flat)):
             return False
-    return not predict(Plan(assembly, shown.start, poses), CLEARANCE_MM, scenario.thresholds, scenario.attach).fails
+    return not predict_failure(
+        Plan(assembly, shown.start, poses), CLEARANCE_MM, scenario.thresholds, scenario.attach
+    ).fails
 
 
 def keep_true_contacts(true: Assembly, wrong: Assembly) -> Assembly:

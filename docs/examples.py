@@ -20,11 +20,11 @@ import numpy as np
 from apo_bench.assembly import Plan, ReplayResult
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, aim_camera, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
+from apo_bench.trial.trial_stages import observe_demonstration, replay_and_judge, simulate_demonstration
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5

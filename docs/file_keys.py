@@ -17,11 +17,11 @@ from fields import sentences
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED
 from apo_bench.benchmark.sweeps.sweep_file import SweepTable
 from apo_bench.cli.shared.setting_options import format_default
-from apo_bench.importers.assembly.writing import THRESHOLDS
+from apo_bench.importers.assembly.scenario_writer import THRESHOLDS
 from apo_bench.perception.observation import noise_file
 from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario import tables as scenario_tables
-from apo_bench.scenario.parts import stated
+from apo_bench.scenario.parts import stated_properties
 from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.arm import Arm
 
@@ -229,11 +229,11 @@ TYPES: Mapping[str, Mapping[str, type[msgspec.Struct]]] = {
     },
     "Noise files": {"": noise_file.NoiseFileTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable},
     "TOML files of parts": {
-        "": stated.MatterTable,
-        "faces.NAME, a plane": stated.PlaneTable,
-        "faces.NAME, a cylinder": stated.CylinderTable,
-        "faces.NAME, a cone": stated.ConeTable,
-        "faces.NAME, a rim": stated.RimTable,
+        "": stated_properties.MatterTable,
+        "faces.NAME, a plane": stated_properties.PlaneTable,
+        "faces.NAME, a cylinder": stated_properties.CylinderTable,
+        "faces.NAME, a cone": stated_properties.ConeTable,
+        "faces.NAME, a rim": stated_properties.RimTable,
     },
     "Sweep files": {"": SweepTable},
 }

@@ -27,8 +27,8 @@ from apo_bench.formats.kit import make_part_mesh
 from apo_bench.geometry import Array, Solid, build_union_mesh, shrink_pieces
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
-from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.scenario.generated.families import FAMILIES
+from apo_bench.scenario.scenario_file import list_scenario_names, load_scenario
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene.render import aim_camera
 from benchmarks import generated as imported

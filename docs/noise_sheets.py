@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 from apo_bench.viz.noise_sheet import (
     SCENARIO,
     describe_model,

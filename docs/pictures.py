@@ -9,12 +9,12 @@ import imageio.v3 as imageio
 
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.rollout import Rollout
-from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import observe_demonstration, simulate_demonstration
 from apo_bench.viz.poses_picture import draw_poses, poses_panel
 
 HERE = Path(__file__).parent / "pictures"

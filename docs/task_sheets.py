@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import build_relation_graph
 from apo_bench.scenario import Scenario
-from apo_bench.scenario.file import list_scenario_names, load_scenario
+from apo_bench.scenario.scenario_file import list_scenario_names, load_scenario
 from apo_bench.viz.graph_picture import draw_graph
 from apo_bench.viz.task_sheet import task_sheet
 from benchmarks.baselines import difficulty, read_counts

@@ -21,13 +21,13 @@ from apo_bench.assembly import Plan
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.physics import Physics
 from apo_bench.simulation.scene.composing import room_with_parts
 from apo_bench.simulation.scene.render import aim_camera
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
+from apo_bench.trial.trial_stages import observe_demonstration, replay_and_judge, simulate_demonstration
 
 PICTURE = Path(__file__).parent / "pictures" / "top.gif"
 ARM = "menagerie:universal_robots_ur5e"

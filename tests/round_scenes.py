@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench import Assembly, Scenario
 from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.attach import Preference
+from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.records import Thresholds
 from apo_bench.scenario.attach_lines import with_attach_lines
 from apo_bench.scenario.parts import find_part_path, load_part

@@ -18,7 +18,7 @@ from apo_bench.assembly import Outcome, ReachedState, Snapshot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.resources import folder
 from apo_bench.simulation.execution.config import ExecutionConfig
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial_stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"
 NAMES = sorted(name for name in apo_bench.__all__ if name not in ("__version__", "InputError", "RateTable", "evaluate"))

@@ -22,25 +22,25 @@ BREACHES = {
     "layers": [
         ("apo_bench.correction.contact.contact", "apo_bench.simulation.scene.world"),
         ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact.contact"),
-        ("apo_bench.scenario.file", "apo_bench.trial.run"),
+        ("apo_bench.scenario.scenario_file", "apo_bench.trial.run"),
         ("apo_bench.geometry.pose", "apo_bench.assembly.poses"),
         ("apo_bench.perception.observation.noise", "apo_bench.trial.run"),
     ],
     "scenario": [
-        ("apo_bench.scenario.parts.load", "apo_bench.scenario.file"),
+        ("apo_bench.scenario.parts.load", "apo_bench.scenario.scenario_file"),
         ("apo_bench.scenario.generated.families", "apo_bench.scenario.layout"),
     ],
-    "planning": [("apo_bench.planning.insertion.arrival", "apo_bench.planning.prediction.failure")],
+    "planning": [("apo_bench.planning.insertion.arrival", "apo_bench.planning.prediction.first_failure")],
     "perception": [
-        ("apo_bench.perception.observation.noise", "apo_bench.perception.detection.contacts"),
-        ("apo_bench.perception.detection.contacts", "apo_bench.perception.depth_camera.locate"),
+        ("apo_bench.perception.observation.noise", "apo_bench.perception.detection.greedy_detection"),
+        ("apo_bench.perception.detection.greedy_detection", "apo_bench.perception.depth_camera.model_localisation"),
     ],
     "benchmark": [
         ("apo_bench.benchmark.sweeps.sweep", "apo_bench.benchmark.report.report"),
         ("apo_bench.benchmark.analysis.rates", "apo_bench.benchmark.sweeps.sweep"),
     ],
     "importers": [
-        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.new_scenario"),
+        ("apo_bench.importers.cad.part_import", "apo_bench.importers.assembly.new_scenario"),
         ("apo_bench.importers.assembly.new_scenario", "apo_bench.importers.recording.importing"),
     ],
     "simulation": [
@@ -54,11 +54,11 @@ BREACHES = {
         ("apo_bench.simulation.hooks", "apo_bench.simulation.robot.robot"),
     ],
     "cad": [
-        ("apo_bench.importers.cad.faces.fitting", "apo_bench.importers.cad.step.surfaces"),
-        ("apo_bench.importers.cad.pieces.cutting", "apo_bench.importers.cad.meshes.shells"),
+        ("apo_bench.importers.cad.faces.surface_fitting", "apo_bench.importers.cad.step.surfaces"),
+        ("apo_bench.importers.cad.pieces.convex_cutting", "apo_bench.importers.cad.meshes.shells"),
     ],
     "cad-loose": [
-        ("apo_bench.importers.cad.pieces.cutting", "apo_bench.importers.cad.contact_faces"),
+        ("apo_bench.importers.cad.pieces.convex_cutting", "apo_bench.importers.cad.contact_faces"),
         ("apo_bench.importers.cad.solids.naming", "apo_bench.importers.cad.part_report"),
     ],
     "correction": [
@@ -80,7 +80,7 @@ BREACHES = {
     ],
     "report": [
         ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.comparison.text"),
-        ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.answer"),
+        ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.conclusions"),
     ],
     "statistics": [
         ("apo_bench.benchmark.analysis.rates", "apo_bench.benchmark.analysis.half_level"),
@@ -92,7 +92,7 @@ BREACHES = {
     ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.perception.observation.noise"),
-        ("apo_bench.judging.contacts", "apo_bench.perception.detection.contacts"),
+        ("apo_bench.judging.contact_limits", "apo_bench.perception.detection.greedy_detection"),
     ],
     "corrector": [
         ("apo_bench.correction.contact.contact", "apo_bench.scenario.scenario"),

@@ -1,6 +1,7 @@
 """Data model of an assembly: topology, poses, observations, plans and corrections, in the terms of the paper."""
 
 from apo_bench.assembly.contact_kinds import ContactKind, classify_contact, compute_geometric_play, compute_play_mm
+from apo_bench.assembly.contact_measurements import ContactMeasurements, OverlapOrMate, measure_round_contact
 from apo_bench.assembly.correction_record import (
     Consistency,
     Correction,
@@ -12,10 +13,17 @@ from apo_bench.assembly.correction_record import (
     Suspect,
 )
 from apo_bench.assembly.demonstration import Demonstration, Layout
+from apo_bench.assembly.equation_pattern import EquationPattern, find_equation_pattern, find_faces_away
 from apo_bench.assembly.equations import Equations, build_contact_equations, find_largest_residual, measure_largest_gap
-from apo_bench.assembly.facing import faces_oppose, measure_face_gap, measure_height
-from apo_bench.assembly.facing_round import FacingPair, find_round_pairs, measure_round
-from apo_bench.assembly.graph import (
+from apo_bench.assembly.facing_pairs import faces_oppose, measure_face_gap, measure_height
+from apo_bench.assembly.heavy_tails import Tails
+from apo_bench.assembly.joint_play import compute_apart_limit_mm, compute_deep_limit_mm, compute_joint_play_mm
+from apo_bench.assembly.observation import Observation
+from apo_bench.assembly.outlier_model import OutlierModel, make_measured_model
+from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, find_schedule_fault, list_poses_between_undos
+from apo_bench.assembly.poses import Poses, compute_placements, list_alternatives
+from apo_bench.assembly.probing_touch import Touch
+from apo_bench.assembly.relation_graph import (
     Arc,
     ArcResiduals,
     Graph,
@@ -24,15 +32,7 @@ from apo_bench.assembly.graph import (
     compute_arc_residuals,
     compute_observed_residuals,
 )
-from apo_bench.assembly.joint_play import compute_apart_limit_mm, compute_deep_limit_mm, compute_joint_play_mm
-from apo_bench.assembly.meeting import Meeting, Meetings, measure_contact
-from apo_bench.assembly.observation import Observation
-from apo_bench.assembly.outlier_model import OutlierModel, make_measured_model
-from apo_bench.assembly.pattern import Pattern, find_contact_pattern, find_faces_away
-from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, find_schedule_fault, list_poses_in_force
-from apo_bench.assembly.poses import Poses, compute_placements, list_alternatives
-from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
-from apo_bench.assembly.reached import Outcome, ProbingResult, ReachedState, ReplayResult, SlipInHand, Snapshot
+from apo_bench.assembly.replay_result import Outcome, ProbingResult, ReachedState, ReplayResult, SlipInHand, Snapshot
 from apo_bench.assembly.resting_contacts import (
     TouchedContact,
     find_touch_points,
@@ -40,8 +40,9 @@ from apo_bench.assembly.resting_contacts import (
     list_outline_points,
     measure_entrance_depth,
 )
+from apo_bench.assembly.round_contacts_as_planes import project_observation, project_observations, project_round_faces
+from apo_bench.assembly.round_face_pairs import FacingPair, find_round_pairs, measure_round_pair
 from apo_bench.assembly.shared_error import SharedError, compute_joint_covariance, correlate_first_order
-from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import (
     ODL,
     Assembly,
@@ -56,7 +57,6 @@ from apo_bench.assembly.topology import (
     simplify_odl,
     spell,
 )
-from apo_bench.assembly.touch import Touch
 
 __all__ = (
     "ODL",
@@ -67,8 +67,10 @@ __all__ = (
     "Consistency",
     "Contact",
     "ContactKind",
+    "ContactMeasurements",
     "Correction",
     "Demonstration",
+    "EquationPattern",
     "Equations",
     "FacingPair",
     "FreeingTrial",
@@ -78,15 +80,13 @@ __all__ = (
     "Hypothesis",
     "Iterate",
     "Layout",
-    "Meeting",
-    "Meetings",
     "Node",
     "Observation",
     "Operation",
     "Outcome",
     "OutlierModel",
+    "OverlapOrMate",
     "PartFace",
-    "Pattern",
     "Plan",
     "Poses",
     "ProbingResult",
@@ -118,7 +118,7 @@ __all__ = (
     "correlate_first_order",
     "evaluate_odl",
     "faces_oppose",
-    "find_contact_pattern",
+    "find_equation_pattern",
     "find_faces_away",
     "find_largest_residual",
     "find_round_pairs",
@@ -128,14 +128,14 @@ __all__ = (
     "invert",
     "list_alternatives",
     "list_outline_points",
-    "list_poses_in_force",
+    "list_poses_between_undos",
     "make_measured_model",
-    "measure_contact",
     "measure_entrance_depth",
     "measure_face_gap",
     "measure_height",
     "measure_largest_gap",
-    "measure_round",
+    "measure_round_contact",
+    "measure_round_pair",
     "project_observation",
     "project_observations",
     "project_round_faces",

@@ -20,7 +20,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.pattern import cross_rows, find_contact_pattern
+from apo_bench.assembly.equation_pattern import cross_rows, find_equation_pattern
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, evaluate_odl
 from apo_bench.geometry import Array, pose
@@ -55,7 +55,7 @@ class Equations:
         occurring = np.unique(self.letters) - len(self.start)
         return tuple(int(k) for k in occurring[::-1] if 0 <= k < n)
 
-    def containing(self, free: Collection[int]) -> NDArray[np.bool_]:
+    def contacts_with(self, free: Collection[int]) -> NDArray[np.bool_]:
         """Whether the word of each contact contains a motion parameter of the `free` operations, (c,)."""
         wanted = np.array(sorted(free), dtype=np.intp) + len(self.start)
         return np.asarray(np.isin(self.letters, wanted).any(axis=1))
@@ -140,7 +140,7 @@ def build_contact_equations(assembly: Assembly, start: Poses, poses: Array) -> E
     Args:
         poses: (n, 4, 4), where the vertices are taken, world frame, [m].
     """
-    known = find_contact_pattern(assembly)
+    known = find_equation_pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
     stack = np.concatenate([constants, poses])
     vertex = np.array(known.corners)

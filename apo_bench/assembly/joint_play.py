@@ -28,21 +28,21 @@ from apo_bench.geometry import (
     pose,
 )
 
-_WALLS = 16
+_WALLS_OF_HOLE = 16
 """Directions in which a hole stops its shaft: a polygon of so many walls, its corners on the circle of play."""
 _LEVER_MM = 30.0
 """Lever arm that turns rotations into lengths, so that all unknowns of the linear program have one scale."""
 _DIGITS = 6
 """Digits of a play in mm that are kept; further ones are rounding of the linear program."""
-_ALONG = 1e-9
+_PARALLEL = 1e-9
 """Opening by a motion of size 1, in the units of the rows, up to which the motion counts as parallel to the face."""
-_ROUND_M = 9
+_POSE_DIGITS = 9
 """Decimal digits of a pose, [m], that distinguish two layouts in the cache."""
 
 AnyFace = Face | RoundFace
 
 
-class _Touch(NamedTuple):
+class _TouchPoints(NamedTuple):
     """The points at which one contact touches, in the frame of the part that rests."""
 
     points: Array
@@ -70,18 +70,18 @@ def compute_joint_play_mm(
         None also for shafts in holes, which are bounded by their own play.
     """
     moved, rests = (end.part for end in contact)
-    together = [
+    contacts_of_pair = [
         relation.contact
         for relation in assembly.relations()
         if relation.made == made and {end.part for end in relation.contact} == {moved, rests}
     ]
-    if len(together) < 2 or not assembly.is_fit(contact):
+    if len(contacts_of_pair) < 2 or not assembly.is_fit(contact):
         return None
     # The moved part first in each pair, whichever was manipulated.
-    pairs = [each if each.manipulated.part == moved else Contact(*each[::-1]) for each in together]
-    T = np.round(pose.inverse(true[rests]) @ true[moved], _ROUND_M) + 0.0
-    faces = tuple((assembly.face_of(m), assembly.face_of(e)) for m, e in pairs)
-    return _opening(faces, together.index(contact), T.tobytes(), clearance_mm)
+    pairs = [each if each.manipulated.part == moved else Contact(*each[::-1]) for each in contacts_of_pair]
+    T = np.round(pose.inverse(true[rests]) @ true[moved], _POSE_DIGITS) + 0.0
+    faces = tuple((assembly.face_of(moved_face), assembly.face_of(resting_face)) for moved_face, resting_face in pairs)
+    return _measure_largest_opening(faces, contacts_of_pair.index(contact), T.tobytes(), clearance_mm)
 
 
 def compute_deep_limit_mm(
@@ -120,7 +120,9 @@ def compute_apart_limit_mm(
 
 
 @lru_cache(maxsize=1024)
-def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
+def _measure_largest_opening(
+    faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float
+) -> float | None:
     """The largest gap of one pair of faces, [mm]; None as in `compute_joint_play_mm`.
 
     Results are cached, since all trials of a seed share the true poses.
@@ -134,13 +136,13 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, 
         return None
     if classify_contact(*faces[which]) == "shaft in hole":
         return None
-    rows, limits, owners = _touch_rows(faces, at, clearance_mm)
-    widest = _widest(rows[owners == which], rows, limits)
+    rows, limits, owners = _list_constraint_rows(faces, at, clearance_mm)
+    widest = _maximise_opening(rows[owners == which], rows, limits)
     return round(widest, _DIGITS) if np.isfinite(widest) else None
 
 
 @lru_cache(maxsize=64)
-def _touch_rows(
+def _list_constraint_rows(
     faces: tuple[tuple[AnyFace, AnyFace], ...], at: bytes, clearance_mm: float
 ) -> tuple[Array, Array, NDArray[np.intp]]:
     """All contact points as rows of the linear program.
@@ -152,7 +154,7 @@ def _touch_rows(
     T = np.frombuffer(at).reshape(4, 4)
     flat = [FacePair(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]
     common = iter(compute_overlaps(flat))
-    touches = [_touch(a, b, T, clearance_mm, common) for a, b in faces]
+    touches = [_find_touch_points(a, b, T, clearance_mm, common) for a, b in faces]
     owners = np.repeat(np.arange(len(touches)), [len(touch.points) for touch in touches])
     points = np.concatenate([touch.points for touch in touches])
     normals = np.concatenate([touch.normals for touch in touches])
@@ -161,57 +163,65 @@ def _touch_rows(
     return rows, np.array([touch.limit_mm for touch in touches])[owners], owners
 
 
-def _widest(own: Array, rows: Array, limits: Array) -> float:
+def _maximise_opening(objective: Array, rows: Array, limits: Array) -> float:
     """The most that a motion opens one of its own rows if no row closes by more than its limit, [mm]; inf if unbounded.
 
     All own rows share one linear program, each with its own motion, since a call takes longer than what it solves. Two
     cases need no program: a shift along a normal is unbounded, or it opens as much as an opposite row allows at most.
 
     Args:
-        own: Rows of the pair asked for, (k, 6).
+        objective: Rows of the pair asked for, (k, 6).
         rows: Rows of all pairs, (m, 6).
         limits: How far each row may close, (m,), [mm].
     """
     from scipy.optimize import linprog
 
-    if not len(own):
+    if not len(objective):
         return np.inf
     # A shift along the normal of each own row goes on until the first row is at its limit.
-    rates = -rows[:, :3] @ own[:, :3].T
-    shift = np.where(rates > _ALONG, limits[:, None] / np.maximum(rates, _ALONG), np.inf).min(axis=0).max()
+    rates = -rows[:, :3] @ objective[:, :3].T
+    shift = np.where(rates > _PARALLEL, limits[:, None] / np.maximum(rates, _PARALLEL), np.inf).min(axis=0).max()
     # Upper bound: no motion opens an own row by more than the limit of a row that is its opposite.
-    faced = (np.abs(rows[:, None] + own) < _ALONG).all(axis=2)
+    faced = (np.abs(rows[:, None] + objective) < _PARALLEL).all(axis=2)
     if shift >= np.where(faced, limits[:, None], np.inf).min(axis=0).max():
         return float(shift)
     # maximise sum_k own_k x_k, with one motion x_k per own row, so that -rows x_k <= limits for each k: the programs
     # have nothing in common, so the matrix of all constraints is block diagonal.
-    together = np.kron(np.eye(len(own)), -rows)
-    optimum = linprog(-own.ravel(), together, np.tile(limits, len(own)), bounds=[(None, None)] * own.size)
-    return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
+    together = np.kron(np.eye(len(objective)), -rows)
+    optimum = linprog(
+        -objective.ravel(), together, np.tile(limits, len(objective)), bounds=[(None, None)] * objective.size
+    )
+    return float((objective * optimum.x.reshape(objective.shape)).sum(axis=1).max()) if optimum.success else np.inf
 
 
-def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, common: Iterator[Overlap]) -> _Touch:
+def _find_touch_points(
+    moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, overlap: Iterator[Overlap]
+) -> _TouchPoints:
     """The contact points of two faces.
 
     Args:
         moved: The face of the part that moves.
         rests: The face of the part that rests.
         T: The pose of the part that moves in the frame of the one that rests, (4, 4), [m].
-        common: Yields the overlap of the next pair of flat faces; advanced only if both faces are flat.
+        overlap: Yields the overlap of the next pair of flat faces; advanced only if both faces are flat.
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):
-        points = next(common).corners
-        return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
+        points = next(overlap).corners
+        return _TouchPoints(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
     between = measure_mate(moved, T, rests, np.eye(4))
     if isinstance(rests, Face):
-        return _Touch(between.points, np.tile(rests.normal, (2, 1)), fit_mm)
+        return _TouchPoints(between.points, np.tile(rests.normal, (2, 1)), fit_mm)
     if isinstance(moved, Face):
-        return _Touch(between.points, np.tile(-T[:3, :3] @ moved.normal, (2, 1)), fit_mm)
-    x = find_direction_across(between.axis)
-    turns = 2.0 * np.pi * (np.arange(_WALLS) + 0.5) / _WALLS
-    ring = np.outer(np.cos(turns), x) + np.outer(np.sin(turns), np.cross(between.axis, x))
+        return _TouchPoints(between.points, np.tile(-T[:3, :3] @ moved.normal, (2, 1)), fit_mm)
+    across = find_direction_across(between.axis)
+    angles = 2.0 * np.pi * (np.arange(_WALLS_OF_HOLE) + 0.5) / _WALLS_OF_HOLE
+    ring = np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(between.axis, across))
     play = compute_play_mm(moved, rests, clearance_mm) or 0.0
     ends = between.points
     # Walls at r cos(pi / N) from the axis make a polygon whose corners lie on the circle of radius r.
-    return _Touch(np.repeat(ends, _WALLS, axis=0), np.tile(ring, (len(ends), 1)), max(0.0, play) * cos(pi / _WALLS))
+    return _TouchPoints(
+        np.repeat(ends, _WALLS_OF_HOLE, axis=0),
+        np.tile(ring, (len(ends), 1)),
+        max(0.0, play) * cos(pi / _WALLS_OF_HOLE),
+    )

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
+from apo_bench.assembly.heavy_tails import Tails
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.plan import Plan
 from apo_bench.assembly.poses import Poses, check_parts
 from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import ArgumentError, require
 from apo_bench.geometry import Array, freeze, make_copyable

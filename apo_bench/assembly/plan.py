@@ -83,7 +83,7 @@ def find_schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     return f"leaves operation {done + 1} undone" if done < operations else ""
 
 
-def list_poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
+def list_poses_between_undos(plan: Plan) -> list[tuple[int, Array]]:
     """The number of operations done, and target poses, (n, 4, 4), before each run of undo steps and at the end."""
     poses = np.array(plan.target_poses)
     done = 0

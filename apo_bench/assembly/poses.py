@@ -24,15 +24,15 @@ def compute_placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[
         One mapping per operation; a part that was not moved yet is at its start.
     """
     history: list[Poses] = []
-    now = dict(start)
+    odls = dict(start)
     for operation, goal in zip(assembly.operations, poses, strict=True):
-        before = now[operation.main]
-        now = dict(now)
+        before = odls[operation.main]
+        odls = dict(odls)
         # A carried part keeps its pose relative to the main part: T_world_carried = T_goal T_before^-1 T_world_carried.
         for part in operation.carries:
-            now[part] = goal @ pose.inverse(before) @ now[part]
-        now[operation.main] = goal
-        history.append(MappingProxyType(now))
+            odls[part] = goal @ pose.inverse(before) @ odls[part]
+        odls[operation.main] = goal
+        history.append(MappingProxyType(odls))
     return tuple(history)
 
 

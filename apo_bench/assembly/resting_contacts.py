@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.contact_kinds import classify_contact
-from apo_bench.assembly.meeting import Meetings
+from apo_bench.assembly.contact_measurements import ContactMeasurements
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
@@ -23,9 +23,9 @@ from apo_bench.geometry import (
     pose,
 )
 
-_QUARTER = np.pi / 2
+_QUARTER_TURN = np.pi / 2
 """Largest angle between neighbouring normals of an arc, [rad]."""
-_RING = 2 * np.pi * np.arange(16) / 16
+_CIRCLE_ANGLES = 2 * np.pi * np.arange(16) / 16
 """Angles of the points that stand for a circle, [rad]."""
 
 
@@ -56,12 +56,12 @@ def find_touched_contacts(
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]
         if len(rests) == 1:
-            touches += list(_touch_normals(assembly, contact, rests[0], poses))
+            touches += list(_list_normals_of_contact(assembly, contact, rests[0], poses))
     return touches
 
 
 def find_touch_points(
-    assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: Meetings | None = None
+    assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: ContactMeasurements | None = None
 ) -> tuple[Array, Array]:
     """The points at which contacts touch, (k, 3), world, [m], and the normal at each, (k, 3).
 
@@ -72,7 +72,9 @@ def find_touch_points(
     """
     every = list(touched)
     flat = iter(
-        (known or Meetings(assembly)).measure_overlaps((each.contact, poses) for each in every if each.points is None)
+        (known or ContactMeasurements(assembly)).measure_overlaps(
+            (each.contact, poses) for each in every if each.points is None
+        )
     )
     points = [next(flat).corners if each.points is None else each.points for each in every]
     normals = [np.tile(each.normal, (len(at), 1)) for each, at in zip(every, points, strict=True)]
@@ -86,23 +88,27 @@ def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array
     T = poses[of.part]
     if isinstance(face, Face):
         return np.asarray(face.outline @ T[:3, :3].T + T[:3, 3])
-    ring = face.around(_RING)
+    ring = face.around(_CIRCLE_ANGLES)
     return pose.apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
 
-def measure_entrance_depth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
-    """How far the moved face has to go along `way`, from first contact in that direction to its place, [m].
+def measure_entrance_depth(
+    assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, direction: Array
+) -> float:
+    """How far the moved face has to go along `direction`, from first contact in that direction to its place, [m].
 
     It is the greatest coordinate of the moved face minus the least coordinate of the resting one.
 
     Args:
-        way: The unit vector of the motion, (3,), world.
+        direction: The unit vector of the motion, (3,), world.
     """
-    ahead, before = (list_outline_points(assembly, of, poses) @ way for of in (moved, rests))
-    return float(ahead.max() - before.min())
+    distance, before = (list_outline_points(assembly, face, poses) @ direction for face in (moved, rests))
+    return float(distance.max() - before.min())
 
 
-def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses) -> Iterator[TouchedContact]:
+def _list_normals_of_contact(
+    assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses
+) -> Iterator[TouchedContact]:
     """Yield one entry for each normal of a contact; `rests` is the face of the resting part."""
     m, e = contact
     other = m if rests == e else e
@@ -120,38 +126,45 @@ def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses:
         n = -T_moved[:3, :3] @ moved.normal
         yield TouchedContact(contact, rests.part, n, pose.apply(T, still.ends) + still.radius * n)
     else:
-        yield from (TouchedContact(contact, rests.part, n, points) for n, points in _around(still, T, moved, T_moved))
+        yield from (
+            TouchedContact(contact, rests.part, n, points)
+            for n, points in _list_normals_around(still, T, moved, T_moved)
+        )
 
 
-def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
+def _list_normals_around(
+    resting_face: RoundFace, T: Array, moved: RoundFace, T_moved: Array
+) -> Iterator[tuple[Array, Array]]:
     """Yield the normals that stand for a contact of two round faces, and the points at which each acts, world.
 
     Normals, (3,), point out of the resting wall and act at both ends of the common length, (k, 3), [m]. Cones and rims
     have one more normal, along the axis, in the direction in which the moved part leaves.
     """
-    kind = classify_contact(still, moved)
-    out = -1.0 if still.hole else 1.0  # the free side of a hole is towards the axis, that of a shaft away from it
-    axis = T[:3, :3] @ still.axis
-    at = pose.apply(T, still.ends)
+    kind = classify_contact(resting_face, moved)
+    out = (
+        -1.0 if resting_face.hole else 1.0
+    )  # the free side of a hole is towards the axis, that of a shaft away from it
+    axis = T[:3, :3] @ resting_face.axis
+    at = pose.apply(T, resting_face.ends)
     if kind == "cone on rim":
-        at = at.mean(axis=0)[None] if still.kind == "rim" else pose.apply(T_moved, moved.ends[:1])
+        at = at.mean(axis=0)[None] if resting_face.kind == "rim" else pose.apply(T_moved, moved.ends[:1])
     else:
         ends = [np.sort((points - at[0]) @ axis) for points in (at, pose.apply(T_moved, moved.ends))]
         common = np.array([max(ends[0][0], ends[1][0]), min(ends[0][1], ends[1][1])])
         at = at[0] + np.outer(common if common[0] < common[1] else [common.mean()], axis)
-    for d in _directions(still, T, moved, T_moved):
-        yield out * d, at + (still.radius * d if kind == "shaft in hole" else 0.0)
+    for direction in _directions_to_wall(resting_face, T, moved, T_moved):
+        yield out * direction, at + (resting_face.radius * direction if kind == "shaft in hole" else 0.0)
     if kind != "shaft in hole":
-        leaves = 1.0 if still.kind == "rim" else -out * np.sign(still.slope)
+        leaves = 1.0 if resting_face.kind == "rim" else -out * np.sign(resting_face.slope)
         yield leaves * axis, at.mean(axis=0)[None]
 
 
-def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[Array]:
+def _directions_to_wall(resting_face: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[Array]:
     """Unit vectors from the axis to the wall, (3,), world, on the shorter arc of two round faces.
 
     If both are whole turns: four directions, 90 degrees apart, aligned with the world, not with the part.
     """
-    face, T = min((still, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
+    face, T = min((resting_face, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
     if face.extent_rad >= WHOLE_TURN - 1e-9:
         z = T[:3, :3] @ face.axis
         x = find_direction_across(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
@@ -161,5 +174,5 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
     x = T[:3, :3] @ face.frame[:3, 0]
     y = T[:3, :3] @ face.frame[:3, 1]
     half = face.extent_rad / 2
-    for turn in np.linspace(-half, half, 1 + int(np.ceil(face.extent_rad / _QUARTER - 1e-9))):
+    for turn in np.linspace(-half, half, 1 + int(np.ceil(face.extent_rad / _QUARTER_TURN - 1e-9))):
         yield np.cos(turn) * x + np.sin(turn) * y

@@ -44,23 +44,23 @@ class SharedError:
         object.__setattr__(self, "operations", operations)
         freeze(self, covariance=(6, 6), frame=(4, 4), correlation=(m, m))
 
-    def ways(self, poses: Array) -> Array:
+    def jacobians(self, poses: Array) -> Array:
         """A_k of the operations that share the error, (m, 6, 6).
 
         Args:
             poses: The observed poses of all operations, (n, 4, 4), world, [m].
         """
-        seen = poses[list(self.operations)]
+        observed = poses[list(self.operations)]
         if self.frame is None:
-            return np.broadcast_to(np.eye(6), (len(seen), 6, 6))
-        back = pose.inverse(seen) @ self.frame
+            return np.broadcast_to(np.eye(6), (len(observed), 6, 6))
+        relative = pose.inverse(observed) @ self.frame
         if self.local:
-            back[:, :3, 3] = 0.0
-        return pose.adjoint(back)
+            relative[:, :3, 3] = 0.0
+        return pose.adjoint(relative)
 
-    def added(self, poses: Array) -> Array:
+    def covariances(self, poses: Array) -> Array:
         """The contribution to the covariance of the body twists of the operations that share the error, (m, 6, 6)."""
-        A = self.ways(poses)
+        A = self.jacobians(poses)
         C = A @ self.covariance @ np.swapaxes(A, 1, 2)
         return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
 
@@ -74,18 +74,18 @@ def compute_joint_covariance(poses: Array, covariance: Array, shared: Sequence[S
     """
     n = len(poses)
     joint = np.zeros((n, 6, n, 6))
-    six = np.arange(6)
+    components = np.arange(6)
     for error in shared:
         k = np.array(error.operations, dtype=np.intp)
-        A = error.ways(poses)
+        A = error.jacobians(poses)
         # The twists of operations k and l are A_k c and A_l c, so their covariance is A_k C A_l^t.
-        between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
+        covariance_between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
         if error.correlation is not None:
-            between *= error.correlation[:, None, :, None]
-        joint[np.ix_(k, six, k, six)] += between
+            covariance_between *= error.correlation[:, None, :, None]
+        joint[np.ix_(k, components, k, components)] += covariance_between
     joint[np.arange(n), :, np.arange(n)] = covariance  # it includes the shared part already
-    whole = joint.reshape(6 * n, 6 * n)
-    return np.asarray((whole + whole.T) / 2)
+    matrix = joint.reshape(6 * n, 6 * n)
+    return np.asarray((matrix + matrix.T) / 2)
 
 
 def correlate_first_order(m: int, correlation: float) -> Array:

@@ -215,9 +215,9 @@ class Assembly:
         """Yield the ODL of every part after each operation; the mapping is overwritten by the next operation."""
         current: dict[str, ODL] = {}
         for k, operation in enumerate(self.operations):
-            before = current.get(operation.main, ())
+            carried_by = current.get(operation.main, ())
             for part in operation.carries:
-                current[part] = simplify_odl((Term(k), *invert(before), *current.get(part, ())))
+                current[part] = simplify_odl((Term(k), *invert(carried_by), *current.get(part, ())))
             current[operation.main] = (Term(k),)
             yield current
 
@@ -229,7 +229,7 @@ class Assembly:
             for part in operation.moves:
                 moved.setdefault(part, []).append(k)
         return tuple(
-            Relation(contact, k, _lost(moved, contact, k))
+            Relation(contact, k, _find_losing_operation(moved, contact, k))
             for k, operation in enumerate(self.operations)
             for contact in operation.contacts
         )
@@ -240,10 +240,10 @@ class Assembly:
 
         Contacts by their number in `relations()`; arcs in the order in which they were made.
         """
-        together: dict[tuple[int, frozenset[str]], list[int]] = {}
+        contacts_by_pair: dict[tuple[int, frozenset[str]], list[int]] = {}
         for i, (contact, made, _) in enumerate(self.relations()):
-            together.setdefault((made, frozenset(of.part for of in contact)), []).append(i)
-        return tuple(map(tuple, together.values()))
+            contacts_by_pair.setdefault((made, frozenset(of.part for of in contact)), []).append(i)
+        return tuple(map(tuple, contacts_by_pair.values()))
 
     @check_arguments
     def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:
@@ -260,7 +260,7 @@ class Assembly:
         return np.array([not {*both}.intersection(left_out) for both in names], dtype=np.bool_)
 
 
-def _lost(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> int | None:
+def _find_losing_operation(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> int | None:
     """The first operation after `made` that moves one of the two parts without the other."""
     ends = [moved.get(end.part, ()) for end in contact]
     later = set(ends[0][bisect(ends[0], made) :]).symmetric_difference(ends[1][bisect(ends[1], made) :])

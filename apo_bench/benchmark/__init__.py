@@ -1,0 +1,1 @@
+"""Measurements over many trials: sweeps, statistics, reports, scores, data sets."""

@@ -56,10 +56,10 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
-        from apo_bench.perception.observation.models.fitted import restate
+        from apo_bench.perception.observation.models.fitted import restate_covariance
         from apo_bench.perception.observation.noise_file import read_noise
 
-        observed = restate(observed, *read_noise(camera_noise))
+        observed = restate_covariance(observed, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
         correction = correct(observed, resolve_simulated(method))

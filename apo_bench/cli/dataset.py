@@ -58,7 +58,7 @@ def dataset_make(
       apo-bench dataset make dovetail --format lerobot --record insertions --policy expert --out inserted
     """
     from apo_bench import load_scenario
-    from apo_bench.benchmark.datasets.making import make_dataset
+    from apo_bench.benchmark.datasets.trial_dataset import make_dataset
     from apo_bench.trial.request import Request, requested_settings
 
     require(record in ("replays", "insertions"), f"--record must be replays or insertions, got {record}.")

@@ -90,10 +90,10 @@ def noise_fit(
     """
     from apo_bench.formats.bop import read_results
     from apo_bench.formats.bop_truth import read_truth
-    from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
-    from apo_bench.perception.observation.models.empirical import residuals_text
+    from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit, fit_noise
+    from apo_bench.perception.observation.models.empirical import format_residuals
     from apo_bench.perception.observation.models.residuals import match_residuals
-    from apo_bench.perception.observation.noise_file import noise_text
+    from apo_bench.perception.observation.noise_file import format_noise_file
     from apo_bench.viz.fit_picture import draw_fit
     from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
 
@@ -104,12 +104,12 @@ def noise_fit(
     results = read_results(estimates)
     matched = match_residuals(results, read_truth(truth, results, scene_id))
     fitted = fit_noise(matched, _one_line(source or f"{estimates.name} against {truth.name}"))
-    form = fit_form(matched, fitted, goodness_of_fit(matched, fitted))
+    form = fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:
         command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-        write_file(out, noise_text(fitted, (_one_line(command), *fit_notes(form))))
+        write_file(out, format_noise_file(fitted, (_one_line(command), *fit_notes(form))))
     if residuals is not None:
-        write_file(residuals, residuals_text(matched))
+        write_file(residuals, format_residuals(matched))
     if picture is not None:
         draw_fit(matched, fitted, picture)
     if as_json:

@@ -19,7 +19,7 @@ from apo_bench.cli.shared import (
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
-from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES
+from apo_bench.scenario.parts.limits import LARGEST_PART_BYTES
 
 _HELP = """
 Parts from CAD files, and parts to print.
@@ -57,9 +57,9 @@ def part_import(
       apo-bench part import bracket.step --out parts
       apo-bench part import bracket.stl --unit mm --name hole1=bore --out parts
     """
-    from apo_bench.importers.cad.importing import raw_solids
+    from apo_bench.importers.cad.part_import import raw_solids
     from apo_bench.importers.cad.part_report import file_lines, report_file
-    from apo_bench.importers.cad.places import named_places, write_places
+    from apo_bench.importers.cad.pose_file import named_places, write_places
     from apo_bench.importers.cad.solids.naming import rename_faces
 
     names = _parse_names(name or [])
@@ -118,7 +118,7 @@ def _import_solids(
     file: Path, solids: Sequence[Any], out: Path, density: float, as_json: bool
 ) -> tuple[list[Any], list[str]]:
     """Parts with their pictures, and the reasons why other solids became none."""
-    from apo_bench.importers.cad.importing import import_solid
+    from apo_bench.importers.cad.part_import import import_solid
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import part_lines, report_part
     from apo_bench.importers.cad.solids.naming import clean_title, make_part_name

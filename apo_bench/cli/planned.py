@@ -9,12 +9,12 @@ def plan_correction(scenario: Scenario, observation: Observation, correction: Co
 
     Only a plan that would not fit needs a simulator.
     """
-    from apo_bench.planning.prediction.failure import predict
+    from apo_bench.planning.prediction.first_failure import predict_failure
     from apo_bench.trial.predicted_success import predict_success
 
     plan = correction.plan(observation)
     moved = ""
-    if predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach).fails:
+    if predict_failure(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach).fails:
         from apo_bench import fit_plan
 
         fitting = fit_plan(correction, observation, scenario)

@@ -50,10 +50,10 @@ def run_command(
     """
     from apo_bench.trial.request import Request, run_request
     from apo_bench.trial.rollout import Rollout
+    from apo_bench.viz.choose_viewer import choose_display
+    from apo_bench.viz.choose_viewer import view as step_through
     from apo_bench.viz.form_text import fact_lines
     from apo_bench.viz.trial_text import summary_lines
-    from apo_bench.viz.viewing import choose_display
-    from apo_bench.viz.viewing import view as step_through
 
     check_output(video, "--video", ".mp4", ".gif")
     check_output(save_observation, "--save-observation", ".json")

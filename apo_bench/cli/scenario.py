@@ -52,7 +52,7 @@ def scenario_list() -> None:
       apo-bench run generated:17 --seed 3
     """
     from apo_bench.io import read_typed
-    from apo_bench.scenario.file import find_scenario_path, list_scenario_names
+    from apo_bench.scenario.scenario_file import find_scenario_path, list_scenario_names
     from apo_bench.scenario.tables import ScenarioTable
 
     tables = {
@@ -117,7 +117,7 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
-    from apo_bench.importers.assembly.writing import choice_lines
+    from apo_bench.importers.assembly.scenario_writer import choice_lines
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     names = [name.strip() for name in order.split(",")] if order else []
@@ -150,7 +150,7 @@ def scenario_check(
       apo-bench scenario check own.toml
       apo-bench scenario check own.toml --arm ur5e_primitive --seeds 20
     """
-    from apo_bench.importers.assembly.checking import check_file
+    from apo_bench.importers.assembly.scenario_check import check_file
 
     check("fidelity", fidelity)
     passed = True

@@ -27,9 +27,9 @@ def view_command(
     """
     from apo_bench import build_scene, load_scenario
     from apo_bench.trial.rollout import scenario_story
-    from apo_bench.viz.trial_again import repeat_trial
+    from apo_bench.viz.choose_viewer import choose_display, view
+    from apo_bench.viz.repeat_trial import repeat_trial
     from apo_bench.viz.trial_text import summary_lines
-    from apo_bench.viz.viewing import choose_display, view
 
     is_sweep = Path(target).is_dir()
     require(

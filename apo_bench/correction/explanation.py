@@ -25,7 +25,7 @@ from apo_bench.assembly import (
     Operation,
     Poses,
     compute_placements,
-    find_contact_pattern,
+    find_equation_pattern,
     project_observation,
 )
 from apo_bench.correction.contact.problem import problem_of
@@ -208,7 +208,7 @@ def _void(assembly: Assembly, kept: NDArray[np.bool_]) -> int:
     """Number of compact equations without content: of contacts that are not kept, and of sheets of fewer than three
     points.
     """
-    said = np.where(kept, np.minimum(np.diff(find_contact_pattern(assembly).begin), 3), 0)
+    said = np.where(kept, np.minimum(np.diff(find_equation_pattern(assembly).begin), 3), 0)
     return int((3 - said).sum())
 
 

@@ -67,7 +67,7 @@ def estimate_shared(
             continue
         # Rows of A: what the shared error makes of the twist of each operation.
         A = np.zeros((len(seen), 6, 6))
-        A[list(error.operations)] = error.ways(seen)
+        A[list(error.operations)] = error.jacobians(seen)
         AC = A.reshape(xi.size, 6) @ error.covariance
         K = np.linalg.solve(joint, AC).T
         C = error.covariance - K @ AC + (K @ free) @ (K @ free).T

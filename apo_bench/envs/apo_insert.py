@@ -1,4 +1,7 @@
-"""The environment `APOInsert-v0`; the docstring of the class is its page in the documentation."""
+"""The environment `APOInsert-v0`; the docstring of the class is its page in the documentation.
+
+The file is long because that page takes 70 lines, and Gymnasium asks for the whole environment as one class.
+"""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,7 @@
-"""The environment `APOReplay-v0`; the docstring of the class is its page in the documentation."""
+"""The environment `APOReplay-v0`; the docstring of the class is its page in the documentation.
+
+The file is long because that page takes 80 lines, and Gymnasium asks for the whole environment as one class.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -42,9 +45,9 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_data_with_arm, build_scene
-from apo_bench.trial.fitting import fit_plan
+from apo_bench.trial.plan_fitting import fit_plan
 from apo_bench.trial.predicted_success import abstain, predict_success
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     demonstration_failure,
     observation_failure,
     observe_demonstration,

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError, shown
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
 from apo_bench.records import Criteria, describe_outcome
-from apo_bench.trial.stages import Attempt, SimulatedDemonstration, demonstration_failure, trial_outcome
+from apo_bench.trial.trial_stages import Attempt, SimulatedDemonstration, demonstration_failure, trial_outcome
 
 DO, UNDO, FINISH = range(3)  # values of `act`
 

@@ -13,7 +13,7 @@ from apo_bench.perception.observation.noise import NoiseLevel
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import FailurePrediction, check, parse_noise_level
 from apo_bench.simulation.scene import Scene, build_scene
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, simulate_demonstration
 
 MOST_SCENES = 8
 """Most compiled scenes of other clearances that are kept."""

@@ -17,7 +17,7 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
 from apo_bench.simulation.task.tip_control import TipControl
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     WRENCH,
     demonstration_failure,
     observe_demonstration,
@@ -139,6 +139,7 @@ def _stated(seen: Observation, correction: Correction | None, assumed: str | Non
     posterior = None if correction is None else correction.covariance
     covariance = seen.covariance if posterior is None else posterior
     sigmas = parse_robot_error(assumed or NO_ROBOT_ERROR)
-    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])  # independent errors add as squares
-    deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])
+    # Independent errors add as squares; the pads' middle is off by half the difference of the fingers.
+    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0], sigmas.sag_mm, sigmas.finger_mm / 2)
+    deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1], sigmas.base_tilt_deg)
     return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))

@@ -13,7 +13,7 @@ from apo_bench.records import (
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.run import probing_config
-from apo_bench.trial.stages import WRENCH, Attempt, draw_robot_error, replay_and_judge, stream_key
+from apo_bench.trial.trial_stages import WRENCH, Attempt, draw_robot_error, replay_and_judge, stream_key
 
 LONGEST_REPLAY_S = 1000.0
 """Simulated time after which a replay starts no further step: seven times the longest replay of the benchmark."""

@@ -61,7 +61,7 @@ def read_observation_file(
     Args:
         deviation_mm, deviation_deg: As in `read_observation`; None means the default.
     """
-    from apo_bench.scenario.file import load_scenario
+    from apo_bench.scenario.scenario_file import load_scenario
 
     assumed = (
         DEVIATION_MM if deviation_mm is None else deviation_mm,

@@ -6,8 +6,8 @@ from apo_bench.geometry.convex import (
     collect_corners,
     enclose_in_ball,
     find_separating_axes,
+    intersect_rays,
     measure_ball_distance,
-    measure_passage,
     project_on_axes,
 )
 from apo_bench.geometry.covering import (
@@ -22,24 +22,23 @@ from apo_bench.geometry.covering import (
     measure_face_area,
     measure_lateral_gap,
 )
-from apo_bench.geometry.exact_turns import measure_depth_inside
 from apo_bench.geometry.flips import Flips, find_approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, count_sides, find_distinct_directions, make_cylinder_hull
 from apo_bench.geometry.mating import Mate, measure_angle, measure_mate
 from apo_bench.geometry.meshes import build_union_mesh
 from apo_bench.geometry.pads import (
-    FINGER_ROOM_M,
+    FINGER_CLEARANCE_M,
     PAD_M,
     PadPlace,
     find_holds,
-    holds_whole,
+    holds_whole_width,
     is_held,
     measure_held_span,
     measure_held_width,
 )
 from apo_bench.geometry.penetration import (
     TOUCH_M,
-    find_ways_out,
+    find_escapes,
     measure_drop,
     measure_drop_depths,
     measure_intrusion,
@@ -57,23 +56,24 @@ from apo_bench.geometry.polygon import (
 from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, measure_extent, measure_world_bounds
-from apo_bench.geometry.swept import PosedPieces, compute_exit_distance, is_way_free
+from apo_bench.geometry.swept import PosedPieces, compute_exit_distance, is_path_free
 from apo_bench.geometry.symmetry import (
     count_folds,
-    find_least_turned,
-    find_nearest_alike,
+    find_least_rotated_pose,
+    find_nearest_equivalent_pose,
     find_nearest_symmetric_pose,
     find_revolution,
     find_symmetries,
     list_quarter_turns,
-    make_turn,
+    make_rotation_about_axis,
 )
+from apo_bench.geometry.symmetry_search import measure_depth_inside
 from apo_bench.geometry.twist import ADJOINTS, GENERATORS, compute_exp_and_jacobian, compute_right_jacobian
 
 __all__ = (
     "ADJOINTS",
     "FARTHEST_M",
-    "FINGER_ROOM_M",
+    "FINGER_CLEARANCE_M",
     "GENERATORS",
     "PAD_M",
     "SAGITTA_M",
@@ -112,21 +112,22 @@ __all__ = (
     "find_approximate_symmetries",
     "find_direction_across",
     "find_distinct_directions",
+    "find_escapes",
     "find_holds",
-    "find_least_turned",
-    "find_nearest_alike",
+    "find_least_rotated_pose",
+    "find_nearest_equivalent_pose",
     "find_nearest_symmetric_pose",
     "find_plane_across",
     "find_revolution",
     "find_separating_axes",
     "find_symmetries",
-    "find_ways_out",
     "flatten_face",
     "freeze",
-    "holds_whole",
+    "holds_whole_width",
+    "intersect_rays",
     "is_held",
+    "is_path_free",
     "is_rigid",
-    "is_way_free",
     "list_polygons",
     "list_quarter_turns",
     "list_rings",
@@ -134,7 +135,7 @@ __all__ = (
     "make_cylinder_hull",
     "make_flat_area",
     "make_plane_frame",
-    "make_turn",
+    "make_rotation_about_axis",
     "measure_angle",
     "measure_ball_distance",
     "measure_depth_inside",
@@ -148,7 +149,6 @@ __all__ = (
     "measure_intrusion_depths",
     "measure_lateral_gap",
     "measure_mate",
-    "measure_passage",
     "measure_upright_bounds",
     "measure_world_bounds",
     "project_on_axes",

@@ -19,7 +19,7 @@ Record = TypeVar("Record")
 Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 
-_MOST_ANSWERS = 16
+_MOST_RESULTS = 16
 """Most results that the cache keeps per object; further ones are computed each time."""
 
 
@@ -92,11 +92,11 @@ def make_copyable(record: type[Record]) -> type[Record]:
 
     A read-only mapping cannot be pickled by itself, and an array that was pickled can be written to.
     """
-    copyreg.pickle(record, _reduced)
+    copyreg.pickle(record, _reduce_record)
     return record
 
 
-def _reduced(record: Any) -> tuple[Any, ...]:
+def _reduce_record(record: Any) -> tuple[Any, ...]:
     """Reduce a record to its class and plain fields, as `copyreg.pickle` needs it."""
     values = {field.name: getattr(record, field.name) for field in fields(record)}
     plain = {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in values.items()}
@@ -118,7 +118,7 @@ def remember(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answe
         if key in answers:
             return answers[key]
         answer = function(*args, **named)
-        if len(answers) < _MOST_ANSWERS:
+        if len(answers) < _MOST_RESULTS:
             answers[key] = answer
         return answer
 

@@ -9,13 +9,13 @@ from apo_bench.geometry.polygon import find_plane_across, make_flat_area
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
-_ON_M = 1e-7
+_ON_SURFACE_M = 1e-7
 """Distance from the plane, cylinder or cone of a face up to which a side lies on it, [m]."""
 _PARALLEL = 1e-7
 """Difference of a cosine from that of aligned directions, up to which a side is parallel to a face."""
 _SLIVER = 1e-6
 """A side that shares less than this fraction of its area with a flat face only borders on the face."""
-_CRUMBS = 0.01
+_VANISHING_SHARE = 0.01
 """Pieces that vanish by the clearance are left out up to this fraction of the volume of the part."""
 _THINNEST_M = 5e-5
 """Half the least thickness of a piece, [m], since MuJoCo ignores thinner boxes; other pieces must contain a ball of
@@ -55,16 +55,16 @@ def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
 
     if all_boxes(solid.pieces):
         return tuple(_recede_box(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
-    hulls = [p if isinstance(p, Hull) else Hull(p.name, p.corners) for p in solid.pieces]
+    hulls = [piece if isinstance(piece, Hull) else Hull(piece.name, piece.corners) for piece in solid.pieces]
     kept = list[Piece]()
-    gone_m3 = 0.0
+    vanished_m3 = 0.0
     for hull in hulls:
         try:
             kept.append(_recede_hull(solid, hull, clearance_m))
         except InputError:
             # What lies behind a fit face and is thinner than the clearance goes with it, if it is hardly anything.
-            gone_m3 += float(ConvexHull(hull.corners).volume)
-            if gone_m3 > _CRUMBS * solid.volume:
+            vanished_m3 += float(ConvexHull(hull.corners).volume)
+            if vanished_m3 > _VANISHING_SHARE * solid.volume:
                 raise
     return tuple(kept)
 
@@ -89,7 +89,7 @@ def _carries_fit(solid: Solid, box: Box, side: Array) -> bool:
     Raises:
         InputError: It carries a face that is not fit as well.
     """
-    on = [face for face in solid.faces.values() if _on_flat(face, box, side)]
+    on = [face for face in solid.faces.values() if _covers_flat_face(face, box, side)]
     fit = [face.name for face in on if face.fit]
     other = [face.name for face in on if not face.fit]
     if fit and other:
@@ -108,7 +108,7 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     """
     if hull.cylinder is not None:
         return _recede_cylinder(solid, hull, clearance_m)
-    on = [i for i, side in enumerate(hull.planes) if _on_fit(solid, hull, side)]
+    on = [i for i, side in enumerate(hull.planes) if _lies_on_fit_face(solid, hull, side)]
     if not on:
         return hull
     planes = np.array(hull.planes)
@@ -116,14 +116,14 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     # Intersecting half spaces needs an interior point: the mean of the corners, else the centre of the largest ball.
     inside = hull.corners.mean(axis=0)
     if (planes[:, 3] - planes[:, :3] @ inside).min() < _THINNEST_M:
-        inside, radius = _middle(planes)
+        inside, radius = _largest_inscribed_ball(planes)
         if radius < _THINNEST_M:
-            raise _swallowed(solid, hull, clearance_m)
+            raise _too_thin_error(solid, hull, clearance_m)
     from scipy.spatial import HalfspaceIntersection
 
     # scipy states half spaces as n . x + b <= 0, hence b = -d.
     corners = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], inside).intersections
-    return Hull(hull.name, _each_once(corners))
+    return Hull(hull.name, _drop_duplicates(corners))
 
 
 def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
@@ -134,19 +134,19 @@ def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     """
     assert hull.cylinder is not None
     center, axis, radius, half = hull.cylinder
-    if any(face.fit and _same_wall(face, hull) for face in solid.rounds.values()):
+    if any(face.fit and _is_wall_of_cylinder(face, hull) for face in solid.rounds.values()):
         radius -= clearance_m
     # The two ends as planes (n, d), and their positions along the axis from the centre after receding.
     sides = {sign: np.append(sign * axis, sign * axis @ center + half) for sign in (-1.0, 1.0)}
-    ends = [sign * (half - clearance_m * _on_fit(solid, hull, side)) for sign, side in sides.items()]
+    ends = [sign * (half - clearance_m * _lies_on_fit_face(solid, hull, side)) for sign, side in sides.items()]
     if radius < _THINNEST_M or ends[1] - ends[0] < 2.0 * _THINNEST_M:
-        raise _swallowed(solid, hull, clearance_m)
+        raise _too_thin_error(solid, hull, clearance_m)
     middle = center + (ends[0] + ends[1]) / 2 * axis
     changed = hull.cylinder._replace(center=middle, radius=radius, half_length=(ends[1] - ends[0]) / 2)
     return make_cylinder_hull(hull.name, changed)
 
 
-def _swallowed(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
+def _too_thin_error(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
     """The error of a piece that the clearance leaves too thin."""
     return InputError(
         f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * _THINNEST_M:g} mm of piece '{hull.name}' of "
@@ -154,27 +154,27 @@ def _swallowed(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
     )
 
 
-def _same_wall(face: RoundFace, hull: Hull) -> bool:
+def _is_wall_of_cylinder(face: RoundFace, hull: Hull) -> bool:
     """Whether a round face is the outer wall of a cylinder piece: same axis, same radius, not a hole."""
     assert hull.cylinder is not None
     center, axis, radius, _ = hull.cylinder
-    off = center - face.point
-    along = abs(face.axis @ axis) > 1.0 - _PARALLEL
+    offset = center - face.point
+    is_parallel = abs(face.axis @ axis) > 1.0 - _PARALLEL
     return bool(
-        along
+        is_parallel
         and not face.hole
-        and np.linalg.norm(off - (off @ face.axis) * face.axis) < _ON_M
-        and abs(face.radius - radius) < _ON_M
+        and np.linalg.norm(offset - (offset @ face.axis) * face.axis) < _ON_SURFACE_M
+        and abs(face.radius - radius) < _ON_SURFACE_M
     )
 
 
-def _on_fit(solid: Solid, hull: Hull, side: Array) -> bool:
+def _lies_on_fit_face(solid: Solid, hull: Hull, side: Array) -> bool:
     """Whether a side, (n, d), lies on a fit face, flat or round."""
-    flat = any(face.fit and _on_flat(face, hull, side) for face in solid.faces.values())
-    return flat or any(face.fit and _on_round(face, hull, side) for face in solid.rounds.values())
+    flat = any(face.fit and _covers_flat_face(face, hull, side) for face in solid.faces.values())
+    return flat or any(face.fit and _is_tangent_to_hole(face, hull, side) for face in solid.rounds.values())
 
 
-def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
+def _is_tangent_to_hole(face: RoundFace, hull: Hull, side: Array) -> bool:
     """Whether a side, (n, d), is tangent to the wall of a hole from outside, somewhere along its span.
 
     The pieces around a hole approximate its wall by such sides; walls of shafts and rims never match.
@@ -183,33 +183,36 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
         return False
     # A side is tangent to the cone r(s) = r0 + slope s about the axis if its normal makes sine slope * w with the axis
     # and it passes it at the distance r0 * w.
-    w = 1.0 / np.sqrt(1.0 + face.slope**2)
-    r = face.radii[0] - face.slope * face.span[0]
-    n = side[:3]
-    if abs(n @ face.axis - face.slope * w) > _PARALLEL or abs(n @ face.point - side[3] - r * w) > _ON_M:
+    cosine = 1.0 / np.sqrt(1.0 + face.slope**2)
+    radius = face.radii[0] - face.slope * face.span[0]
+    normal = side[:3]
+    if (
+        abs(normal @ face.axis - face.slope * cosine) > _PARALLEL
+        or abs(normal @ face.point - side[3] - radius * cosine) > _ON_SURFACE_M
+    ):
         return False
-    at = (_corners_on(hull, side) - face.point) @ face.axis
-    return bool(at.max() > face.span[0] + _ON_M and at.min() < face.span[1] - _ON_M)
+    along = (_find_corners_on_side(hull, side) - face.point) @ face.axis
+    return bool(along.max() > face.span[0] + _ON_SURFACE_M and along.min() < face.span[1] - _ON_SURFACE_M)
 
 
-def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
+def _covers_flat_face(face: Face, piece: Piece, side: Array) -> bool:
     """Whether a side, (n, d), lies in the plane of a face and covers some of it."""
     from shapely import MultiPoint
 
-    n = side[:3]
-    if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - side[3]) > _ON_M:
+    normal = side[:3]
+    if normal @ face.normal < 1.0 - _PARALLEL or abs(normal @ face.outline[0] - side[3]) > _ON_SURFACE_M:
         return False
-    to_plane = find_plane_across(n)
-    own = MultiPoint(_corners_on(piece, side) @ to_plane).convex_hull
-    return bool(own.intersection(make_flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * own.area)
+    to_plane = find_plane_across(normal)
+    area = MultiPoint(_find_corners_on_side(piece, side) @ to_plane).convex_hull
+    return bool(area.intersection(make_flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * area.area)
 
 
-def _corners_on(piece: Piece, side: Array) -> Array:
+def _find_corners_on_side(piece: Piece, side: Array) -> Array:
     """The corners of a piece that lie on one of its sides, (n, d): (k, 3), [m]."""
-    return np.asarray(piece.corners[np.abs(piece.corners @ side[:3] - side[3]) < _ON_M])
+    return np.asarray(piece.corners[np.abs(piece.corners @ side[:3] - side[3]) < _ON_SURFACE_M])
 
 
-def _middle(planes: Array) -> tuple[Array, float]:
+def _largest_inscribed_ball(planes: Array) -> tuple[Array, float]:
     """Centre, (3,), and radius of the largest ball inside all planes (n, d), (s, 4), [m]; radius 0 if there is none."""
     from scipy.optimize import linprog
 
@@ -219,7 +222,7 @@ def _middle(planes: Array) -> tuple[Array, float]:
     return (optimum.x[:3], float(optimum.x[3])) if optimum.success else (np.zeros(3), 0.0)
 
 
-def _each_once(corners: Array) -> Array:
+def _drop_duplicates(corners: Array) -> Array:
     """Corners, (k, 3), without duplicates up to rounding, in their order."""
     _, first = np.unique(np.round(corners, 9), axis=0, return_index=True)
     return np.asarray(corners[np.sort(first)])

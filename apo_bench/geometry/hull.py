@@ -13,7 +13,7 @@ SAGITTA_M = 5e-6
 """Largest distance between a round wall and the flat sides that stand for it, [m]."""
 FEWEST_SIDES = 16
 """Least number of flat sides of a round wall."""
-_FLAT = 1e-7
+_COPLANAR = 1e-7
 """Two unit vectors are equal if their cosine is above 1 minus this."""
 
 
@@ -106,7 +106,7 @@ def find_distinct_directions(directions: Array, signed: bool = False) -> Array:
         signed: True: opposite vectors are distinct; False: they are equal.
     """
     cosine = directions @ directions.T
-    alike = (cosine if signed else np.abs(cosine)) > 1.0 - _FLAT
+    alike = (cosine if signed else np.abs(cosine)) > 1.0 - _COPLANAR
     kept: list[int] = []
     known = np.zeros(len(directions), dtype=np.bool_)
     for i, like in enumerate(alike):

@@ -15,44 +15,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import collect_corners, measure_passage
+from apo_bench.geometry.convex import collect_corners, intersect_rays
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.polygon import find_plane_across
 from apo_bench.geometry.solid import Piece, Solid, measure_extent
 
 PAD_M = (0.016, 0.010, 0.026)
 """Extent of a pad from the point between the tips: to each side, down and up, [m]."""
-_FINGER_M = 0.012
+_FINGER_THICKNESS_M = 0.012
 """Thickness of a finger along the closing direction, [m]."""
-FINGER_ROOM_M = 0.012
+FINGER_CLEARANCE_M = 0.012
 """Free width that a finger needs next to the held surface, beyond its own thickness, to come down and open, [m]."""
-_PALM_M = 0.060
+_PALM_HEIGHT_M = 0.060
 """Height of the palm above the tips, [m]: the part may reach at most so far above them."""
-_OVER_M = 0.0115
+_LEAST_TIP_HEIGHT_M = 0.0115
 """Least height of the tips above the lowest point of the part, [m], so that the pads clear what the part stands on."""
-_RAY_M = 0.003
+_RAY_SPACING_M = 0.003
 """Spacing of the rays, [m]."""
-_FINE_M = 0.001
-"""Spacing of the rows of rays where `_RAY_M` finds no hold, [m], as on a thin flange; also least length of a pinch."""
-_FLAT_M = 1e-4
+_FINE_SPACING_M = 0.001
+"""Spacing of the rows of rays where `_RAY_SPACING_M` finds no hold, [m], as on a thin flange; also least length of a
+pinch."""
+_PRESSED_DEPTH_M = 1e-4
 """Surfaces that lie at most so far behind the outermost one are pressed by the pad too, [m]."""
-_LINE_M = 0.003
+_LEAST_LINE_M = 0.003
 """Least length of a pressed line, [m]. A pressed area that is narrower than this counts as a line."""
-_PINCH_M = 0.006
+_PINCH_HEIGHT_M = 0.006
 """Tips higher than this over the top of the part pinch its upper edge, [m]: denser rays, shorter pressed lines."""
-_PINCH_RAY_M = 0.0005
+_PINCH_SPACING_M = 0.0005
 """Spacing of the rows of rays for a pinch, [m]."""
 _ROUNDING_M = 1e-6
 """Slack when rays are matched to the extent of a piece, [m]."""
-_TINY_M = 1e-8
+_HEIGHT_SLACK_M = 1e-8
 """Slack when heights of tips are compared with their limits, [m]."""
-_LEVEL = 1e-3
+_PERPENDICULAR = 1e-3
 """Largest cosine at which two directions count as perpendicular; 1 minus it: as parallel."""
-_HEIGHT = 0.65
+_PREFERRED_HEIGHT = 0.65
 """Preferred height of the tips above the lowest point of the part, as a fraction of its height."""
-_LESS_M = 0.002
+_WIDTH_SLACK_M = 0.002
 """Half a held width may be so much less than half the extent of the part and still count as all of it, [m]."""
-_UNEVEN_M = 0.003
+_LINE_COST_M = 0.003
 """Extra cost of a hold along a line, [m]: a flat hold so much farther from the centre of mass is as good."""
 
 
@@ -96,17 +97,17 @@ def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up
         pads.
     """
     along = np.cross(up, across)
-    side, down, over = PAD_M
+    side, down, up_m = PAD_M
     t = float(point @ along)
     h = float(point @ up)
-    columns = _lines(t - side, t + side, _axes_within(pieces, along, t - side, t + side))
-    rows = _lines(h - down, h + over, _axes_within(pieces, up, h - down, h + over))
-    rays = _cast(pieces, across, up, columns, rows)
-    here = float(point @ across)
-    spans = _clusters(rays, np.ones(len(rays.t), dtype=np.bool_))
-    begins = [low for low, _ in spans if low < here]
-    ends = [high for _, high in spans if high > here]
-    return (begins[-1] - here, ends[0] - here) if begins and ends else None
+    columns = _grid_coordinates(t - side, t + side, _axes_of_cylinders(pieces, along, t - side, t + side))
+    rows = _grid_coordinates(h - down, h + up_m, _axes_of_cylinders(pieces, up, h - down, h + up_m))
+    rays = _cast_ray_grid(pieces, across, up, columns, rows)
+    center = float(point @ across)
+    spans = _merge_narrow_gaps(rays, np.ones(len(rays.t), dtype=np.bool_))
+    begins = [low for low, _ in spans if low < center]
+    ends = [high for _, high in spans if high > center]
+    return (begins[-1] - center, ends[0] - center) if begins and ends else None
 
 
 @lru_cache(maxsize=4096)
@@ -121,11 +122,11 @@ def measure_held_width(
     return None if span is None else (span[1] - span[0]) / 2
 
 
-def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
+def holds_whole_width(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
     """Whether the pads hold the part over its whole width along `across`, not just one arm of it."""
     low, high = measure_extent(pieces, across)
     own = measure_held_width(pieces, tuple(point), tuple(across), tuple(up))
-    return own is not None and own > (high - low) / 2 - _LESS_M
+    return own is not None and own > (high - low) / 2 - _WIDTH_SLACK_M
 
 
 def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[PadPlace, ...]:
@@ -139,10 +140,10 @@ def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -
         opening_m: Largest travel of each finger from the middle, [m].
         over_m: How far the tips may be above the top of the part, [m]; the pads reach below the tips.
     """
-    asks = solid, tuple(map(float, up)), opening_m, over_m
-    if over_m > _PINCH_M:
-        return _places(*asks, _PINCH_RAY_M)
-    return _places(*asks, _RAY_M) or _places(*asks, _FINE_M)
+    arguments = solid, tuple(map(float, up)), opening_m, over_m
+    if over_m > _PINCH_HEIGHT_M:
+        return _search_holds(*arguments, _PINCH_SPACING_M)
+    return _search_holds(*arguments, _RAY_SPACING_M) or _search_holds(*arguments, _FINE_SPACING_M)
 
 
 def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: float) -> bool:
@@ -155,35 +156,37 @@ def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: flo
         opening_m: Largest travel of each finger from the middle, [m].
     """
     along = np.cross(up, across)
-    t, h, here = (float(point @ axis) for axis in (along, up, across))
+    t, h, center = (float(point @ axis) for axis in (along, up, across))
     # First exactly the pad, then a margin around it: material just below the pads may join what they hold, or block
     # them, so either answer is accepted.
-    for rim in (0.0, _RAY_M):
-        ends = (t - PAD_M[0] - rim, t + PAD_M[0] + rim), (h - PAD_M[1] - rim, h + PAD_M[2])
+    for margin in (0.0, _RAY_SPACING_M):
+        ends = (t - PAD_M[0] - margin, t + PAD_M[0] + margin), (h - PAD_M[1] - margin, h + PAD_M[2])
         columns, rows = (
-            _lines(*each, [mid, *_round_axes(solid, axis, *each)], _PINCH_RAY_M)
-            for each, mid, axis in zip(ends, (t, h), (along, up), strict=True)
+            _grid_coordinates(*range_m, [middle, *_axes_of_round_faces(solid, axis, *range_m)], _PINCH_SPACING_M)
+            for range_m, middle, axis in zip(ends, (t, h), (along, up), strict=True)
         )
-        offers = _offers(_cast(solid.pieces, across, up, columns, rows), t, h, opening_m, _FINE_M)
-        if any(low < here < high for low, high, _ in offers):
+        intervals = _list_holdable_intervals(
+            _cast_ray_grid(solid.pieces, across, up, columns, rows), t, h, opening_m, _FINE_SPACING_M
+        )
+        if any(low < center < high for low, high, _ in intervals):
             return True
     return False
 
 
-def _round_axes(solid: Solid, axis: Array, low: float, high: float) -> list[float]:
+def _axes_of_round_faces(solid: Solid, axis: Array, low: float, high: float) -> list[float]:
     """Coordinates along `axis`, between low and high, of the axes of round faces that are perpendicular to it, [m]."""
-    places = [float(f.point @ axis) for f in solid.rounds.values() if abs(f.axis @ axis) < _LEVEL]
+    places = [float(f.point @ axis) for f in solid.rounds.values() if abs(f.axis @ axis) < _PERPENDICULAR]
     return [x for x in places if low < x < high]
 
 
-def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
+def _axes_of_cylinders(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
     """Coordinates along `axis`, between low and high, of the centres of cylinders, [m]."""
     middles = [float(p.cylinder.center @ axis) for p in pieces if isinstance(p, Hull) and p.cylinder is not None]
     return [x for x in middles if low < x < high]
 
 
 @lru_cache(maxsize=128)
-def _places(
+def _search_holds(
     solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float, ray_m: float
 ) -> tuple[PadPlace, ...]:
     """Search the holds for `find_holds`, best first, with rows of rays `ray_m` apart, [m].
@@ -193,52 +196,56 @@ def _places(
     up = np.array(vertical)
     bottom, top = measure_extent(solid.pieces, up)
     # The preferred height, unless the pads would touch the ground or the palm the part there.
-    best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
-    least, step = (_LINE_M, _RAY_M) if over_m <= _PINCH_M else (_FINE_M, _PINCH_RAY_M)
-    heights = _lines(bottom, max(top + over_m, best), [best], step)
-    tips = heights[heights >= max(bottom + _OVER_M, top - _PALM_M) - _TINY_M]
+    best_height = max(bottom + _PREFERRED_HEIGHT * (top - bottom), bottom + _LEAST_TIP_HEIGHT_M, top - _PALM_HEIGHT_M)
+    least_length, step = (
+        (_LEAST_LINE_M, _RAY_SPACING_M) if over_m <= _PINCH_HEIGHT_M else (_FINE_SPACING_M, _PINCH_SPACING_M)
+    )
+    heights = _grid_coordinates(bottom, max(top + over_m, best_height), [best_height], step)
+    tips = heights[heights >= max(bottom + _LEAST_TIP_HEIGHT_M, top - _PALM_HEIGHT_M) - _HEIGHT_SLACK_M]
     candidates: list[tuple[float, PadPlace]] = []
-    for across in _directions(solid, up):
+    for across in _closing_directions(solid, up):
         along = np.cross(up, across)
         low, high = measure_extent(solid.pieces, along)
-        t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
-        level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
-        rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
+        t = _grid_coordinates(
+            low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _PERPENDICULAR]
+        )
+        shaft_heights = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _PERPENDICULAR]
+        rays = _cast_ray_grid(solid.pieces, across, up, t, _grid_coordinates(bottom, top, shaft_heights, ray_m))
         for tip in tips:
-            for place in t:
-                for low, high, uneven in _offers(rays, place, tip, opening_m, least):
-                    point = (low + high) / 2 * across + place * along + tip * up
+            for column in t:
+                for low, high, is_line in _list_holdable_intervals(rays, column, tip, opening_m, least_length):
+                    point = (low + high) / 2 * across + column * along + tip * up
                     # Cost in metres: level distance from the centre of mass (1-norm), height, width, line contact.
-                    off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
-                    cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
+                    distance = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
+                    cost = float(distance + 0.5 * abs(tip - best_height) + 0.25 * (high - low) + _LINE_COST_M * is_line)
                     candidates.append((round(cost, 9), PadPlace(point, across, (high - low) / 2)))
     return tuple(hold for _, hold in sorted(candidates, key=lambda each: each[0]))
 
 
-def _directions(solid: Solid, up: Array) -> Iterator[Array]:
+def _closing_directions(solid: Solid, up: Array) -> Iterator[Array]:
     """Level directions in which the pads may close: across flat faces, and across the walls of shafts.
 
     A shaft that stands upright could be held in any direction; four directions, 45 degrees apart, stand for all. Each
     direction comes once, whichever its sign.
     """
-    ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
+    candidates = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _PERPENDICULAR]
     for face in (face for face in solid.rounds.values() if not face.hole and face.kind == "cylinder"):
-        if abs(face.axis @ up) > 1.0 - _LEVEL:
+        if abs(face.axis @ up) > 1.0 - _PERPENDICULAR:
             x, y = (np.asarray(axis - (axis @ up) * up) for axis in find_plane_across(up).T)
-            ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
+            candidates += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
         else:
-            ways.append(np.cross(up, face.axis))
+            candidates.append(np.cross(up, face.axis))
     kept: list[Array] = []
-    for way in ways:
-        way = way - (way @ up) * up
-        way = way / np.linalg.norm(way)
-        if all(abs(way @ other) < 1.0 - 1e-6 for other in kept):
-            kept.append(way)
+    for direction in candidates:
+        direction = direction - (direction @ up) * up
+        direction = direction / np.linalg.norm(direction)
+        if all(abs(direction @ other) < 1.0 - 1e-6 for other in kept):
+            kept.append(direction)
             # Sign convention: the largest component is positive; + 0.0 turns -0 into 0.
-            yield np.asarray(way * np.sign(way[np.abs(way).argmax()]) + 0.0)
+            yield np.asarray(direction * np.sign(direction[np.abs(direction).argmax()]) + 0.0)
 
 
-def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M) -> Array:
+def _grid_coordinates(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_SPACING_M) -> Array:
     """Coordinates of grid lines from just inside `low` to just inside `high`, sorted, (k,), [m].
 
     Args:
@@ -251,7 +258,7 @@ def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M
     return np.unique(np.round(np.append(middle + np.linspace(-reach, reach, 2 * n + 1), also), 9))
 
 
-def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
+def _cast_ray_grid(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
     """Cast a grid of rays along `across` through the pieces.
 
     Args:
@@ -259,46 +266,50 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     """
     along = np.cross(up, across)
     corners, first = collect_corners(pieces)
-    (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
-    met = np.flatnonzero((t0 < t1) & (h0 < h1))  # pieces that at least one ray can hit
+    (t0, t1), (h0, h1) = (
+        _grid_range_of_pieces(places, corners @ axis, first) for places, axis in ((t, along), (h, up))
+    )
+    hit_pieces = np.flatnonzero((t0 < t1) & (h0 < h1))  # pieces that at least one ray can hit
     T, H = np.meshgrid(t, h)
     start = T[..., None] * along + H[..., None] * up
     number = np.arange(T.size).reshape(T.shape)
     rays, lows, highs = [np.zeros(0, dtype=np.intp)], [np.zeros(0)], [np.zeros(0)]
-    for i in met:
-        here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
-        enter, leave = measure_passage(pieces[i].planes, start[here].reshape(-1, 3), across)
+    for i in hit_pieces:
+        window = slice(h0[i], h1[i]), slice(t0[i], t1[i])
+        enter, leave = intersect_rays(pieces[i].planes, start[window].reshape(-1, 3), across)
         hit = np.isfinite(enter)
-        rays.append(number[here].ravel()[hit])
+        rays.append(number[window].ravel()[hit])
         lows.append(enter[hit])
         highs.append(leave[hit])
     # Pack the passages of each ray into the first columns of its row: most rays pass through few of many pieces.
     ray, low, high = (np.concatenate(each) for each in (rays, lows, highs))
-    order = np.lexsort((low, ray))
-    ray = ray[order]
-    place = np.arange(len(ray)) - np.searchsorted(ray, ray)  # number of a passage within its ray
-    ends = [np.full((T.size, int(place.max(initial=0)) + 1), empty) for empty in (np.inf, -np.inf)]
+    by_entry = np.lexsort((low, ray))
+    ray = ray[by_entry]
+    passage = np.arange(len(ray)) - np.searchsorted(ray, ray)  # number of a passage within its ray
+    ends = [np.full((T.size, int(passage.max(initial=0)) + 1), empty) for empty in (np.inf, -np.inf)]
     for end, values in zip(ends, (low, high), strict=True):
-        end[ray, place] = values[order]
+        end[ray, passage] = values[by_entry]
     return _Rays(T.ravel(), H.ravel(), *ends)
 
 
-def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _grid_range_of_pieces(
+    grid: Array, coordinates: Array, first_corner: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """For each piece, the range of grid coordinates inside its extent on an axis.
 
     Args:
-        places: Grid coordinates, ascending, [m].
-        at: Coordinates of the corners of all pieces on the axis, piece by piece, [m].
-        first: Index of the first corner of each piece.
+        grid: Grid coordinates, ascending, [m].
+        coordinates: Coordinates of the corners of all pieces on the axis, piece by piece, [m].
+        first_corner: Index of the first corner of each piece.
 
     Returns:
         Index of the first grid coordinate of each piece, and the index after its last.
     """
-    low = np.searchsorted(places, np.minimum.reduceat(at, first) - _ROUNDING_M)
-    return low, np.searchsorted(places, np.maximum.reduceat(at, first) + _ROUNDING_M)
+    low = np.searchsorted(grid, np.minimum.reduceat(coordinates, first_corner) - _ROUNDING_M)
+    return low, np.searchsorted(grid, np.maximum.reduceat(coordinates, first_corner) + _ROUNDING_M)
 
 
-def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
+def _merge_narrow_gaps(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Intervals of material along the rays, (begin, end), ascending, [m]; gaps too narrow for a finger are closed.
 
     Args:
@@ -306,56 +317,58 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
     """
     low = rays.low[within]
     high = rays.high[within]
-    there = np.isfinite(low)
-    if not there.any():
+    is_hit = np.isfinite(low)
+    if not is_hit.any():
         return []
-    order = np.argsort(low[there])
-    low = low[there][order]
-    reached = np.maximum.accumulate(high[there][order])
+    order = np.argsort(low[is_hit])
+    low = low[is_hit][order]
+    farthest = np.maximum.accumulate(high[is_hit][order])
     # A finger fits into a gap that is wider than the finger and its distance from the surface.
-    apart = low[1:] >= reached[:-1] + _FINGER_M + FINGER_ROOM_M
-    begins = np.append(low[0], low[1:][apart])
-    ends = np.append(reached[:-1][apart], reached[-1])
+    is_gap = low[1:] >= farthest[:-1] + _FINGER_THICKNESS_M + FINGER_CLEARANCE_M
+    begins = np.append(low[0], low[1:][is_gap])
+    ends = np.append(farthest[:-1][is_gap], farthest[-1])
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> Iterator[tuple[float, float, bool]]:
+def _list_holdable_intervals(
+    rays: _Rays, t: float, h: float, opening_m: float, least_length: float
+) -> Iterator[tuple[float, float, bool]]:
     """Intervals that pads with their tips at (t, h) can hold: (begin, end, line), [m], `line` if touched along one
     only.
 
     Args:
         opening_m: Largest travel of each finger from the middle, [m].
-        least: Least length of the pressed area in one of its two directions, [m].
+        least_length: Least length of the pressed area in one of its two directions, [m].
     """
-    side, down, over = PAD_M
+    side, down, up_m = PAD_M
     # Rays at the fingers, from a margin below the pads upwards; those of them at pad height; those on the pad itself.
-    above = (np.abs(rays.t - t) <= side + _RAY_M) & (rays.h >= h - down - _RAY_M)
-    within = above & (rays.h <= h + over)
-    on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
-    enter, leave = rays.low[within], rays.high[within]
-    for low, high in _clusters(rays, within):
-        if (high - low) / 2 + FINGER_ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
+    at_fingers = (np.abs(rays.t - t) <= side + _RAY_SPACING_M) & (rays.h >= h - down - _RAY_SPACING_M)
+    at_pads = at_fingers & (rays.h <= h + up_m)
+    on_pad = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[at_pads]
+    enter, leave = rays.low[at_pads], rays.high[at_pads]
+    for low, high in _merge_narrow_gaps(rays, at_pads):
+        if (high - low) / 2 + FINGER_CLEARANCE_M / 2 > opening_m or _blocks_finger(rays, at_fingers, low, high):
             continue
         # First and last surface of each ray within this interval of material; passages outside count as NaN.
-        own = np.where((enter >= low - 1e-9) & (leave <= high + 1e-9), 1.0, np.nan)
+        inside = np.where((enter >= low - 1e-9) & (leave <= high + 1e-9), 1.0, np.nan)
         with np.errstate(invalid="ignore"):
-            first = np.fmin.reduce(enter * own, axis=1)
-            last = np.fmax.reduce(leave * own, axis=1)
-            pressed = on & (first < low + _FLAT_M) & (last > high - _FLAT_M)
+            first = np.fmin.reduce(enter * inside, axis=1)
+            last = np.fmax.reduce(leave * inside, axis=1)
+            pressed = on_pad & (first < low + _PRESSED_DEPTH_M) & (last > high - _PRESSED_DEPTH_M)
         # Something near the middle of the pad must be pressed, or the part would turn in the grip.
-        if (np.abs(rays.t[within][pressed] - t) < side / 3).any():
-            lengths = [float(np.ptp(places[within][pressed])) for places in (rays.t, rays.h)]
-            if max(lengths) >= least:
-                yield low, high, min(lengths) < _LINE_M
+        if (np.abs(rays.t[at_pads][pressed] - t) < side / 3).any():
+            lengths = [float(np.ptp(places[at_pads][pressed])) for places in (rays.t, rays.h)]
+            if max(lengths) >= least_length:
+                yield low, high, min(lengths) < _LEAST_LINE_M
 
 
-def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
+def _blocks_finger(rays: _Rays, at_fingers: NDArray[np.bool_], low: float, high: float) -> bool:
     """Whether the part itself blocks a finger next to the held interval, either open or on its way down.
 
     Args:
-        above: The rays at the fingers and above them, (r,).
+        at_fingers: The rays at the fingers and above them, (r,).
         low, high: The held interval along the rays, [m].
     """
-    room = _FINGER_M + FINGER_ROOM_M
-    beside = (low - room, low - 1e-6), (high + 1e-6, high + room)
-    return any(bool(((rays.low[above] < end) & (rays.high[above] > begin)).any()) for begin, end in beside)
+    needed = _FINGER_THICKNESS_M + FINGER_CLEARANCE_M
+    sides = (low - needed, low - 1e-6), (high + 1e-6, high + needed)
+    return any(bool(((rays.low[at_fingers] < end) & (rays.high[at_fingers] > begin)).any()) for begin, end in sides)

@@ -13,13 +13,13 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, copy_frozen
 from apo_bench.geometry.convex import (
-    across_edges,
-    across_sides,
-    box_axes,
-    boxes_around,
-    boxes_reach,
     collect_corners,
+    compute_half_projection_sums,
     find_separating_axes,
+    list_bounding_boxes,
+    list_box_axes,
+    list_edge_axes,
+    list_side_axes,
     measure_ball_distance,
     project_on_axes,
 )
@@ -31,15 +31,15 @@ TOUCH_M = 1e-6
 """Depth above which a solid counts as inside another one; up to it they touch, [m]."""
 _STEP_M = 5e-4
 """Coarse spacing of the heights tested along a fall, [m]: two boxes thinner than this together could be missed."""
-_MOST_PLACES = 10_000
+_MOST_HEIGHTS = 10_000
 """Most heights tested along a fall; a longer fall gets a coarser spacing."""
-_AT_ONCE = 100_000
+_BATCH_SIZE = 100_000
 """Pairs of pieces times heights that one batch of a fall computes, which bounds the memory."""
-_MOST_ROOMS = 4_000_000
+_MOST_BOUNDS = 4_000_000
 """Pairs of pieces times places that one call computes elsewhere, which bounds the memory."""
 
 
-class WaysOut(NamedTuple):
+class Escape(NamedTuple):
     """The directions along which one piece can be moved out of another one, and how far."""
 
     directions: Array
@@ -64,7 +64,7 @@ def measure_intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 def measure_intrusion_depths(
     a: tuple[Piece, ...],
     R_a: Array,
-    at: Array,
+    positions: Array,
     b: tuple[Piece, ...],
     T_b: Array,
     apart_m: float = np.inf,
@@ -74,7 +74,7 @@ def measure_intrusion_depths(
 
     Args:
         R_a: (3, 3), the orientation of `a`, the same at all places, world.
-        at: (k, 3), the positions of the frame of `a`, world, [m].
+        positions: (k, 3), the positions of the frame of `a`, world, [m].
         T_b: (4, 4), world pose of `b`, [m].
         apart_m: The result may be cut off at -apart_m, which saves time.
         measured_m: Pairs whose bounding volumes are farther apart than this may count by the distance of these instead.
@@ -83,17 +83,19 @@ def measure_intrusion_depths(
         The depth of the deepest pair at each place, (k,), [m].
     """
     if not (all_boxes(a) and all_boxes(b)):
-        return _piece_by_piece(a, R_a, at, b, T_b, apart_m, measured_m)
-    axes = box_axes(R_a, T_b[:3, :3])
+        return _measure_general_pieces(a, R_a, positions, b, T_b, apart_m, measured_m)
+    axes = list_box_axes(R_a, T_b[:3, :3])
     # The depth of two boxes is the least overlap of their projections (min over axes); that of two solids is the depth
     # of their deepest pair (max over pairs).
-    reach = boxes_reach(a, R_a, b, T_b[:3, :3], axes)
-    between = (boxes_around(a)[0] @ R_a.T)[:, None] - (boxes_around(b)[0] @ T_b[:3, :3].T + T_b[:3, 3])[None]
-    apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
-    return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
+    half_sums = compute_half_projection_sums(a, R_a, b, T_b[:3, :3], axes)
+    offsets = (list_bounding_boxes(a)[0] @ R_a.T)[:, None] - (list_bounding_boxes(b)[0] @ T_b[:3, :3].T + T_b[:3, 3])[
+        None
+    ]
+    distances = np.abs((offsets @ axes.T)[None] + (positions @ axes.T)[:, None, None])
+    return np.asarray((half_sums[None] - distances).min(axis=-1).max(axis=(1, 2)))
 
 
-def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
+def find_escapes(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[Escape]:
     """For each pair of pieces deeper in each other than `deep_m`, the directions and lengths to move the first piece
     out.
 
@@ -104,17 +106,19 @@ def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> 
     R_a = T_a[:3, :3]
     R_b = T_b[:3, :3]
     if all_boxes(a.pieces) and all_boxes(b.pieces):
-        axes = box_axes(R_a, R_b)
-        centers_a, centers_b = (pose.apply(T, boxes_around(of.pieces)[0]) for T, of in ((T_a, a), (T_b, b)))
+        axes = list_box_axes(R_a, R_b)
+        centers_a, centers_b = (
+            pose.apply(T, list_bounding_boxes(solid.pieces)[0]) for T, solid in ((T_a, a), (T_b, b))
+        )
         along = (centers_a[:, None] - centers_b[None]) @ axes.T
-        depths = boxes_reach(a.pieces, R_a, b.pieces, R_b, axes) - np.abs(along)
+        depths = compute_half_projection_sums(a.pieces, R_a, b.pieces, R_b, axes) - np.abs(along)
         for i, j in np.argwhere(depths.min(axis=-1) > deep_m):
-            yield _ways(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
+            yield _escape_of_pair(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
         return
-    balls_a, radii_a = _balls(a.pieces)
-    balls_b, radii_b = _balls(b.pieces)
-    between = pose.apply(T_a, balls_a)[:, None] - pose.apply(T_b, balls_b)[None]
-    near = np.sqrt((between * between).sum(axis=-1)) < radii_a[:, None] + radii_b
+    balls_a, radii_a = _list_bounding_balls(a.pieces)
+    balls_b, radii_b = _list_bounding_balls(b.pieces)
+    offsets = pose.apply(T_a, balls_a)[:, None] - pose.apply(T_b, balls_b)[None]
+    near = np.sqrt((offsets * offsets).sum(axis=-1)) < radii_a[:, None] + radii_b
     for own, other in ((a.pieces[i], b.pieces[j]) for i, j in np.argwhere(near)):
         axes = find_separating_axes(own, R_a, other, R_b)
         middle_a, half_a = project_on_axes(own, R_a, axes)
@@ -122,10 +126,10 @@ def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> 
         along = axes @ (T_a[:3, 3] - T_b[:3, 3]) + middle_a - middle_b
         depths = half_a + half_b - np.abs(along)
         if depths.min() > deep_m:
-            yield _ways(own, T_a, other, T_b, axes, along, depths)
+            yield _escape_of_pair(own, T_a, other, T_b, axes, along, depths)
 
 
-def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array, depths: Array) -> WaysOut:
+def _escape_of_pair(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array, depths: Array) -> Escape:
     """The ways out of one pair.
 
     Args:
@@ -135,28 +139,34 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
         depths: Overlap of the projections on each axis, (k,), [m].
     """
     piece, T = (a, T_a) if a.half.max() < b.half.max() else (b, T_b)
-    return WaysOut(axes * np.where(along < 0.0, -1.0, 1.0)[:, None], depths, pose.apply(T, piece.center[None])[0])
+    return Escape(axes * np.where(along < 0.0, -1.0, 1.0)[:, None], depths, pose.apply(T, piece.center[None])[0])
 
 
-def _piece_by_piece(
-    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float, measured_m: float
+def _measure_general_pieces(
+    a: tuple[Piece, ...],
+    R_a: Array,
+    positions: Array,
+    b: tuple[Piece, ...],
+    T_b: Array,
+    apart_m: float,
+    measured_m: float,
 ) -> Array:
     """`measure_intrusion_depths` for pieces that are not all boxes.
 
     Distances of enclosing balls and of upright boxes, and the overlap across sides alone, bound the depth of a pair
     from above. So most pairs need no test of all axes. Many places are split in halves to bound the memory.
     """
-    pairs = _pairs(a, R_a, at, b, T_b, apart_m)
-    if len(at) < 2 or len(at) * len(pairs) < _MOST_ROOMS:
-        return _measure(a, R_a, at, b, T_b, pairs, apart_m, measured_m)
-    halves = (at[: len(at) // 2], at[len(at) // 2 :])
-    return np.concatenate([_piece_by_piece(a, R_a, each, b, T_b, apart_m, measured_m) for each in halves])
+    pairs = _find_near_pairs(a, R_a, positions, b, T_b, apart_m)
+    if len(positions) < 2 or len(positions) * len(pairs) < _MOST_BOUNDS:
+        return _measure_pairs(a, R_a, positions, b, T_b, pairs, apart_m, measured_m)
+    halves = (positions[: len(positions) // 2], positions[len(positions) // 2 :])
+    return np.concatenate([_measure_general_pieces(a, R_a, each, b, T_b, apart_m, measured_m) for each in halves])
 
 
-def _measure(
+def _measure_pairs(
     a: tuple[Piece, ...],
     R_a: Array,
-    at: Array,
+    positions: Array,
     b: tuple[Piece, ...],
     T_b: Array,
     pairs: Any,
@@ -172,77 +182,85 @@ def _measure(
     # Pairs that are surely apart count by the lower bound of their distance. The others are measured, nearest first,
     # and only at places where they may be deeper than what was found there before. The normals of sides come first,
     # since they bound the depth from above.
-    rooms = _rooms(a, R_a, at, b, T_b, pairs)
-    deepest = np.where(rooms > measured_m, -rooms, -np.inf).max(axis=1, initial=-apart_m)
-    closest = rooms.min(axis=0, initial=np.inf)
+    bounds = _bound_distances(a, R_a, positions, b, T_b, pairs)
+    deepest = np.where(bounds > measured_m, -bounds, -np.inf).max(axis=1, initial=-apart_m)
+    closest = bounds.min(axis=0, initial=np.inf)
     order = np.flatnonzero(closest <= measured_m)
     for k in order[np.argsort(closest[order], kind="stable")]:
         i, j = pairs[k]
-        room = rooms[:, k]
-        near = (room <= measured_m) & (-room > deepest)
+        bound = bounds[:, k]
+        near = (bound <= measured_m) & (-bound > deepest)
         if not near.any():
             continue
-        across = np.full(len(at), -np.inf)
-        across[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], T_b[:3, :3]))
-        near &= across > deepest
+        side_depths = np.full(len(positions), -np.inf)
+        side_depths[near] = _least_projected_overlap(
+            a[i], R_a, positions[near], b[j], T_b, list_side_axes(a[i], R_a, b[j], T_b[:3, :3])
+        )
+        near &= side_depths > deepest
         if near.any():
-            edges = _depths(a[i], R_a, at[near], b[j], T_b, across_edges(a[i], R_a, b[j], T_b[:3, :3]))
-            deepest[near] = np.maximum(deepest[near], np.minimum(across[near], edges))
+            edge_depths = _least_projected_overlap(
+                a[i], R_a, positions[near], b[j], T_b, list_edge_axes(a[i], R_a, b[j], T_b[:3, :3])
+            )
+            deepest[near] = np.maximum(deepest[near], np.minimum(side_depths[near], edge_depths))
     return deepest
 
 
-def _pairs(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float) -> Any:
+def _find_near_pairs(
+    a: tuple[Piece, ...], R_a: Array, positions: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float
+) -> Any:
     """Pairs of pieces whose upright boxes, swept over all places, come nearer than `apart_m`: their numbers, (p, 2)."""
-    mine, its = np.arange(len(a)), np.arange(len(b))
+    ours, theirs = np.arange(len(a)), np.arange(len(b))
     if np.isinf(apart_m):
-        return np.stack(np.meshgrid(mine, its, indexing="ij"), axis=-1).reshape(-1, 2)
-    (mid_a, half_a), (mid_b, half_b) = _upright(a, R_a), _upright(b, T_b[:3, :3])
+        return np.stack(np.meshgrid(ours, theirs, indexing="ij"), axis=-1).reshape(-1, 2)
+    (mid_a, half_a), (mid_b, half_b) = _list_world_aligned_boxes(a, R_a), _list_world_aligned_boxes(b, T_b[:3, :3])
     slack = apart_m + TOUCH_M
-    low_a, high_a = mid_a - half_a + at.min(axis=0) - slack, mid_a + half_a + at.max(axis=0) + slack
+    low_a, high_a = mid_a - half_a + positions.min(axis=0) - slack, mid_a + half_a + positions.max(axis=0) + slack
     low_b, high_b = mid_b - half_b + T_b[:3, 3], mid_b + half_b + T_b[:3, 3]
     # First the pieces of each solid that come near the box around all pieces of the other, then pair by pair.
-    its = its[((low_b < high_a.max(axis=0)) & (high_b > low_a.min(axis=0))).all(axis=1)]
-    if not len(its):
+    theirs = theirs[((low_b < high_a.max(axis=0)) & (high_b > low_a.min(axis=0))).all(axis=1)]
+    if not len(theirs):
         return np.zeros((0, 2), dtype=np.intp)
-    mine = mine[((low_a < high_b[its].max(axis=0)) & (high_a > low_b[its].min(axis=0))).all(axis=1)]
-    near = np.ones((len(mine), len(its)), dtype=np.bool_)
+    ours = ours[((low_a < high_b[theirs].max(axis=0)) & (high_a > low_b[theirs].min(axis=0))).all(axis=1)]
+    near = np.ones((len(ours), len(theirs)), dtype=np.bool_)
     for axis in range(3):
-        near &= low_a[mine, axis, None] < high_b[its, axis]
-        near &= high_a[mine, axis, None] > low_b[its, axis]
+        near &= low_a[ours, axis, None] < high_b[theirs, axis]
+        near &= high_a[ours, axis, None] > low_b[theirs, axis]
     i, j = np.nonzero(near)
-    return np.column_stack([mine[i], its[j]])
+    return np.column_stack([ours[i], theirs[j]])
 
 
-def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any) -> Array:
+def _bound_distances(
+    a: tuple[Piece, ...], R_a: Array, positions: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any
+) -> Array:
     """Lower bounds of the distance of each pair of pieces at each place, (k, p), [m]; negative where they may overlap.
 
     The bound is the larger one of the distances of enclosing balls and of upright boxes.
     """
-    mine, its = pairs.T
-    balls_a, radii_a = _balls(a)
-    balls_b, radii_b = _balls(b)
-    boxes_a, halves_a = _upright(a, R_a)
-    boxes_b, halves_b = _upright(b, T_b[:3, :3])
-    shift = at - T_b[:3, 3]
+    ours, theirs = pairs.T
+    balls_a, radii_a = _list_bounding_balls(a)
+    balls_b, radii_b = _list_bounding_balls(b)
+    boxes_a, halves_a = _list_world_aligned_boxes(a, R_a)
+    boxes_b, halves_b = _list_world_aligned_boxes(b, T_b[:3, :3])
+    shift = positions - T_b[:3, 3]
     middles_a = balls_a @ R_a.T
     middles_b = balls_b @ T_b[:3, :3].T
     # One axis after the other: reducing arrays of (k, p, 3) along their last axis takes three times as long.
-    squared = np.zeros((len(at), len(pairs)))
-    apart = np.full(squared.shape, -np.inf)
+    ball_distances = np.zeros((len(positions), len(pairs)))
+    box_distances = np.full(ball_distances.shape, -np.inf)
     for i in range(3):
         along = shift[:, i, None]
-        between = along + middles_a[mine, i] - middles_b[its, i]
-        squared += between * between
-        gap = along + boxes_a[mine, i] - boxes_b[its, i]
+        offsets = along + middles_a[ours, i] - middles_b[theirs, i]
+        ball_distances += offsets * offsets
+        gap = along + boxes_a[ours, i] - boxes_b[theirs, i]
         np.abs(gap, out=gap)
-        gap -= halves_a[mine, i] + halves_b[its, i]
-        np.maximum(apart, gap, out=apart)
-    np.sqrt(squared, out=squared)
-    squared -= radii_a[mine] + radii_b[its]
-    return np.maximum(squared, apart, out=apart)
+        gap -= halves_a[ours, i] + halves_b[theirs, i]
+        np.maximum(box_distances, gap, out=box_distances)
+    np.sqrt(ball_distances, out=ball_distances)
+    ball_distances -= radii_a[ours] + radii_b[theirs]
+    return np.maximum(ball_distances, box_distances, out=box_distances)
 
 
-def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
+def _list_world_aligned_boxes(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     """Centres and half sizes, (k, 3) each, [m], of world-aligned boxes around pieces turned by R about the origin."""
     corners, first = collect_corners(pieces)
     turned = corners @ R.T
@@ -251,36 +269,36 @@ def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     return (low + high) / 2, (high - low) / 2
 
 
-def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
+def _least_projected_overlap(a: Piece, R_a: Array, positions: Array, b: Piece, T_b: Array, axes: Array) -> Array:
     """The least overlap of the projections of two pieces over some axes, at k places, (k,), [m]; inf without axes."""
     middle_a, half_a = project_on_axes(a, R_a, axes)
     middle_b, half_b = project_on_axes(b, T_b[:3, :3], axes)
-    apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
-    return np.asarray((half_a + half_b - apart).min(axis=-1, initial=np.inf))
+    distances = np.abs((positions - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
+    return np.asarray((half_a + half_b - distances).min(axis=-1, initial=np.inf))
 
 
 @lru_cache(maxsize=1024)
-def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+def _list_bounding_balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     """Centres, (k, 3), and radii, (k,), of a ball around each piece, in the frame of the solid, [m]."""
     corners = [piece.corners for piece in pieces]
     radii = [np.linalg.norm(c - p.center, axis=1).max() for c, p in zip(corners, pieces, strict=True)]
     return copy_frozen([piece.center for piece in pieces], None, 3), copy_frozen(radii, None)
 
 
-def measure_upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
+def measure_upright_bounds(pieces: tuple[Piece, ...], R: Array, position: Array) -> tuple[Array, Array]:
     """The lowest and the highest corner, (3,) each, of the world-aligned box around all posed pieces, [m].
 
     Args:
         R: (3, 3), their orientation, world.
-        at: (3,), the position of their frame, world, [m].
+        position: (3,), the position of their frame, world, [m].
     """
     if not all_boxes(pieces):
-        corners = collect_corners(pieces)[0] @ R.T + at
+        corners = collect_corners(pieces)[0] @ R.T + position
         return corners.min(axis=0), corners.max(axis=0)
-    centers, halves = boxes_around(pieces)
-    middle = centers @ R.T + at
-    reach = halves @ np.abs(R).T
-    return (middle - reach).min(axis=0), (middle + reach).max(axis=0)
+    centers, halves = list_bounding_boxes(pieces)
+    middle = centers @ R.T + position
+    extent = halves @ np.abs(R).T
+    return (middle - extent).min(axis=0), (middle + extent).max(axis=0)
 
 
 def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
@@ -294,38 +312,38 @@ def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     low = max(0.0, float(low_a[2] - high_b[2]))
     high = float(high_a[2] - low_b[2])
     for step in (_STEP_M, TOUCH_M):
-        ways = np.linspace(low, high, min(int((high - low) / step) + 2, _MOST_PLACES))
-        met = _first_met(a, T_a, ways, b, T_b)
-        if met is None:
+        drops = np.linspace(low, high, min(int((high - low) / step) + 2, _MOST_HEIGHTS))
+        index = _find_first_contact(a, T_a, drops, b, T_b)
+        if index is None:
             return np.inf
-        low = float(ways[max(0, met - 1)])
-        high = float(ways[met])
+        low = float(drops[max(0, index - 1)])
+        high = float(drops[index])
     return low
 
 
-def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
-    """The index in `ways`, (k,), [m], of the first drop at which `a` is deeper in `b` than `TOUCH_M`; None if none
+def _find_first_contact(a: Solid, T_a: Array, drops: Array, b: Solid, T_b: Array) -> int | None:
+    """The index in `drops`, (k,), [m], of the first drop at which `a` is deeper in `b` than `TOUCH_M`; None if none
     is.
     """
-    R_a, at = T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
+    R_a, positions = T_a[:3, :3], T_a[:3, 3] - np.outer(drops, (0.0, 0.0, 1.0))
     if all_boxes(a.pieces) and all_boxes(b.pieces):
-        pairs, many = None, len(a.pieces) * len(b.pieces)
+        pairs, pairs_per_drop = None, len(a.pieces) * len(b.pieces)
     else:
-        pairs = _pairs(a.pieces, R_a, at, b.pieces, T_b, 0.0)
-        many = max(1, len(pairs))
-    count = max(1, _AT_ONCE // many)
-    for begin in range(0, len(ways), count):
-        here = at[begin : begin + count]
+        pairs = _find_near_pairs(a.pieces, R_a, positions, b.pieces, T_b, 0.0)
+        pairs_per_drop = max(1, len(pairs))
+    count = max(1, _BATCH_SIZE // pairs_per_drop)
+    for begin in range(0, len(drops), count):
+        batch = positions[begin : begin + count]
         if pairs is None:
-            depths = measure_intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
+            depths = measure_intrusion_depths(a.pieces, R_a, batch, b.pieces, T_b)
         else:
-            depths = _measure(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0, 0.0)
-        met = np.flatnonzero(depths > TOUCH_M)
-        if len(met):
-            return begin + int(met[0])
+            depths = _measure_pairs(a.pieces, R_a, batch, b.pieces, T_b, pairs, 0.0, 0.0)
+        contacts = np.flatnonzero(depths > TOUCH_M)
+        if len(contacts):
+            return begin + int(contacts[0])
     return None
 
 
-def measure_drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
+def measure_drop_depths(a: Solid, T_a: Array, drops: Array, b: Solid, T_b: Array) -> Array:
     """How deep `a` is in `b` after each of k drops along -z of the world, (k,), [m]; negative where they are apart."""
-    return measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0)), b.pieces, T_b)
+    return measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(drops, (0.0, 0.0, 1.0)), b.pieces, T_b)

@@ -12,7 +12,7 @@ from apo_bench.geometry.arrays import Array
 
 FARTHEST_M = 1e4
 """Largest distance from the origin, [m]; beyond it rounding is no longer small."""
-_ONE = np.eye(4)
+_IDENTITY = np.eye(4)
 """The identity pose."""
 _NOT_ORTHOGONAL = 1e-6
 """Largest entry of R R^t - 1 of a rotation."""
@@ -35,10 +35,11 @@ def exp(twist: ArrayLike) -> Array:
     twist = np.asarray(twist, dtype=np.float64)
     K = hat(twist[..., 3:])
     # Rodrigues: R = 1 + A K + B K^2, and the shift is V v with V = 1 + B K + C K^2, A = sin a / a and so on.
-    A, B, C = _series(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
+    A, B, C = _rodrigues_coefficients(np.sqrt((twist[..., 3:] * twist[..., 3:]).sum(axis=-1))[..., None, None])
     K2 = K @ K
-    V = np.eye(3) + B * K + C * K2
-    return rigid(np.eye(3) + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
+    one = _IDENTITY[:3, :3]
+    V = one + B * K + C * K2
+    return rigid(one + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
 
 
 def log(T: ArrayLike) -> Array:
@@ -60,7 +61,7 @@ def log(T: ArrayLike) -> Array:
 def inverse(T: ArrayLike) -> Array:
     """The inverse displacement, (*, 4, 4) -> (*, 4, 4)."""
     T = np.asarray(T, dtype=np.float64)
-    R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
+    R_inverse = T[..., :3, :3].swapaxes(-1, -2)
     return rigid(R_inverse, -(R_inverse @ T[..., :3, 3, None])[..., 0])
 
 
@@ -71,7 +72,7 @@ def hat(w: ArrayLike) -> Array:
     out[..., 0, 1] = -w[..., 2]
     out[..., 0, 2] = w[..., 1]
     out[..., 1, 2] = -w[..., 0]
-    return out - np.swapaxes(out, -1, -2)
+    return out - out.swapaxes(-1, -2)
 
 
 def adjoint(T: ArrayLike) -> Array:
@@ -89,7 +90,9 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
 
     Quarter turns are exact, so that parts that stand upright stand exactly upright.
     """
-    rx, ry, rz = (_turn(axis, angle) for axis, angle in enumerate(np.asarray(turn_deg, dtype=np.float64)))
+    rx, ry, rz = (
+        _rotation_about_axis(axis, angle) for axis, angle in enumerate(np.asarray(turn_deg, dtype=np.float64))
+    )
     return rigid(rz @ ry @ rx, position)
 
 
@@ -162,8 +165,8 @@ def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
     if not finite.all():
         T = np.where(finite[:, None, None], T, 0.0)
     R = T[:, :3, :3]
-    orthogonal = np.abs(R @ np.swapaxes(R, 1, 2) - _ONE[:3, :3]).reshape(n, 9).max(axis=1) < _NOT_ORTHOGONAL
-    last_row = np.abs(T[:, 3] - _ONE[3]).max(axis=1) < _NOT_ORTHOGONAL
+    orthogonal = np.abs(R @ np.swapaxes(R, 1, 2) - _IDENTITY[:3, :3]).reshape(n, 9).max(axis=1) < _NOT_ORTHOGONAL
+    last_row = np.abs(T[:, 3] - _IDENTITY[3]).max(axis=1) < _NOT_ORTHOGONAL
     return np.asarray(finite & orthogonal & last_row & (np.linalg.det(R) > 0.0))
 
 
@@ -173,7 +176,7 @@ def apply(T: ArrayLike, points: ArrayLike) -> Array:
     return np.asarray(points, dtype=np.float64) @ T[:3, :3].T + T[:3, 3]
 
 
-def _series(angle: Array) -> tuple[Array, Array, Array]:
+def _rodrigues_coefficients(angle: Array) -> tuple[Array, Array, Array]:
     """sin(a)/a, (1-cos a)/a^2 and (a-sin a)/a^3, also at zero."""
     # Below 1e-4 two terms of each series are exact to rounding, where the quotients lose digits.
     near = angle < 1e-4
@@ -184,7 +187,7 @@ def _series(angle: Array) -> tuple[Array, Array, Array]:
     return A, B, C
 
 
-def _turn(axis: int, degrees: float) -> Array:
+def _rotation_about_axis(axis: int, degrees: float) -> Array:
     """The rotation about axis 0, 1 or 2 (x, y, z), (3, 3); exact for multiples of 90 degrees."""
     quarter = round(degrees / 90.0)
     if degrees == 90.0 * quarter:

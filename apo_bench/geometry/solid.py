@@ -26,8 +26,8 @@ class Face:
     fit: bool = False
     """Whether the physical part recedes here by the clearance; the nominal face does not."""
     stated_normal: Array | None = None
-    """The normal of a sheet (`apo_bench.assembly.projection`), whose corners may be points or the ends of a line; else
-    None."""
+    """The normal of a sheet (`apo_bench.assembly.round_contacts_as_planes`), whose corners may be points or the ends of
+    a line; else None."""
     opposes: bool = True
     """Whether a touching face must have the opposite normal; False for a plane through an axis, whose sides are
     equal."""
@@ -105,11 +105,11 @@ def all_boxes(pieces: tuple[Piece, ...]) -> bool:
 
 def measure_extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
     """The least and the greatest coordinate of pieces along a direction, (3,), of their own frame, [m]."""
-    ends = [_ends(piece, along) for piece in pieces]
+    ends = [_project_piece(piece, along) for piece in pieces]
     return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
 
 
-def _ends(piece: Piece, along: Array) -> tuple[float, float]:
+def _project_piece(piece: Piece, along: Array) -> tuple[float, float]:
     """The least and the greatest coordinate of one piece along a direction, [m]."""
     if isinstance(piece, Hull):
         heights = piece.corners @ along

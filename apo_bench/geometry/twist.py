@@ -14,7 +14,7 @@ _SHORT = 9
 """The same for angles up to one radian."""
 
 
-def _generators() -> Array:
+def _list_generators() -> Array:
     """The matrices of the six unit twists, (6, 4, 4)."""
     G = np.zeros((6, 4, 4))
     G[range(3), range(3), 3] = 1.0
@@ -22,14 +22,14 @@ def _generators() -> Array:
     return G
 
 
-def _adjoints() -> Array:
+def _list_adjoints() -> Array:
     """The adjoint matrices of the six unit twists, (6, 6, 6)."""
     G = np.zeros((6, 6, 6))
     G[3:, :3, :3] = G[3:, 3:, 3:] = G[:3, :3, 3:] = hat(np.eye(3)) + 0.0
     return G
 
 
-def _series() -> Array:
+def _list_series_coefficients() -> Array:
     """Coefficients of X^2 and X^3 in exp(X), and of ad, .., ad^4 in J_r, by powers of the squared angle q, (TERMS, 6).
 
     With x = -q: X^4 = x X^2, and odd powers of ad are ad^(2k+1) = k x^(k-1) ad^3 - (k-1) x^k ad. Even powers follow
@@ -47,16 +47,16 @@ def _series() -> Array:
     return C
 
 
-GENERATORS = _generators()
+GENERATORS = _list_generators()
 """A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
 _TO_MATRIX = np.ascontiguousarray(GENERATORS[:, :3].reshape(6, 12))
 """The first three rows of the generators, flattened: a twist times this is X without its zero row, (6, 12)."""
-ADJOINTS = _adjoints()
+ADJOINTS = _list_adjoints()
 """The adjoint matrix of a twist xi is sum_i xi_i ADJOINTS[i], (6, 6, 6)."""
 _TO_ADJOINT = ADJOINTS.reshape(6, 36)
 """The adjoints, flattened: a twist times this is its adjoint matrix, (6, 36)."""
-_COEFFICIENTS = _series()
-"""Series coefficients, (TERMS, 6), from `_series`."""
+_COEFFICIENTS = _list_series_coefficients()
+"""Series coefficients, (TERMS, 6), from `_list_series_coefficients`."""
 _ONE4 = np.eye(4)
 _ONE6 = np.eye(6)
 _SUM = np.ones(3)

@@ -1,0 +1,1 @@
+"""Import of data of your own: CAD parts, assemblies, tracker recordings."""

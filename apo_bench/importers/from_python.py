@@ -30,7 +30,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
         >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
         ['plate.xml']
     """
-    from apo_bench.importers.cad.importing import import_solid, raw_solids
+    from apo_bench.importers.cad.part_import import import_solid, raw_solids
     from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
@@ -123,7 +123,7 @@ def check_scenario(scenario: str | Path | Scenario, *, seeds: int = 5, fidelity:
     Raises:
         InputError: There is no such file.
     """
-    from apo_bench.importers.assembly.checking import check_file
+    from apo_bench.importers.assembly.scenario_check import check_file
 
     source = scenario.source if isinstance(scenario, Scenario) else find_scenario_path(scenario)
     require(source is not None, "a scenario was given that was not read from a file; give its file.")

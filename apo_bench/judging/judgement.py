@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.assembly import (
     Snapshot,
 )
-from apo_bench.judging.contacts import ContactVerdict, faults_in_words
+from apo_bench.judging.contact_limits import ContactVerdict, list_contact_faults
 from apo_bench.records import Thresholds
 
 FAULTS = ("not_made", "gap", "overlap", "penetration", "pushed", "not_released", "not_at_rest")
@@ -52,7 +52,7 @@ class Judgement:
         return next((fault for fault, is_there in self.conditions.items() if is_there), "ok")
 
 
-def judgement(
+def make_judgement(
     contacts: tuple[ContactVerdict, ...],
     states: Sequence[Snapshot],
     pushes: Sequence[tuple[str, float]],
@@ -68,7 +68,7 @@ def judgement(
         states: The snapshots in which nothing may penetrate, be held or move.
         pushes: Part and its displacement [mm], as the rule limits it.
         all_made: Whether every operation ended and there is a snapshot of the end.
-        disturbed: Displacements of parts in the world [mm], if `pushes` are other lengths.
+        disturbed: Displacements of parts in the world [mm], if `list_pushes` are other lengths.
     """
     # `not x <= limit` also fails a value that is not a number.
     conditions = {
@@ -78,13 +78,13 @@ def judgement(
         "penetration": any(not s.penetration_m * 1e3 <= thresholds.penetration_mm for s in states),
         "pushed": any(not push <= thresholds.placed_part_shift_mm for _, push in pushes),
         "not_released": any(not s.released for s in states),
-        "not_at_rest": any(not _rests(s, thresholds) for s in states),
+        "not_at_rest": any(not _is_at_rest(s, thresholds) for s in states),
     }
     first = next((fault for fault, is_there in conditions.items() if is_there), "ok")
     return Judgement(
         loose=all_made and all(c.loose for c in contacts),
         conditions=MappingProxyType(conditions),
-        why=_why(first, contacts, states, pushes, thresholds),
+        why=_describe_fault(first, contacts, states, pushes, thresholds),
         contacts=contacts,
         gap_mm=max((c.gap_mm for c in contacts if c.gap_mm is not None), default=None),
         angle_deg=max((c.angle_deg for c in contacts), default=None),
@@ -94,7 +94,7 @@ def judgement(
     )
 
 
-def _why(
+def _describe_fault(
     fault: str,
     contacts: tuple[ContactVerdict, ...],
     states: Sequence[Snapshot],
@@ -103,7 +103,7 @@ def _why(
 ) -> str:
     """The fault in words; empty for faults without details."""
     if fault in ("gap", "overlap"):
-        return dict(faults_in_words(contacts, thresholds))[fault]
+        return dict(list_contact_faults(contacts, thresholds))[fault]
     if fault == "penetration":
         deepest = max(s.penetration_m * 1e3 for s in states)
         return f"{deepest:.2f} mm deep, where {thresholds.penetration_mm:g} mm are allowed"
@@ -113,7 +113,7 @@ def _why(
     return ""
 
 
-def _rests(snapshot: Snapshot, thresholds: Thresholds) -> bool:
+def _is_at_rest(snapshot: Snapshot, thresholds: Thresholds) -> bool:
     """Whether the parts of a snapshot are at rest."""
     slow = snapshot.speed_m_s * 1e3 < thresholds.rest_mm_s
     return slow and np.degrees(snapshot.spin_rad_s) < thresholds.rest_deg_s

@@ -6,13 +6,13 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Meetings, ReachedState, Snapshot
+from apo_bench.assembly import Assembly, ContactMeasurements, ReachedState, Snapshot
 from apo_bench.geometry import Array, copy_frozen
-from apo_bench.judging.contacts import ContactJudge
-from apo_bench.judging.demonstrated import judge_demonstrated
-from apo_bench.judging.displaced import displacements
-from apo_bench.judging.finished import fixtures, judge_finished
+from apo_bench.judging.as_demonstrated import judge_demonstrated
+from apo_bench.judging.contact_limits import ContactJudge
+from apo_bench.judging.finished_assembly import judge_finished, list_fixtures
 from apo_bench.judging.judgement import Judgement
+from apo_bench.judging.part_displacement import measure_displacements
 from apo_bench.records import Criteria, Meaning
 
 
@@ -68,8 +68,8 @@ def judge(assembly: Assembly, reached: ReachedState, reference: Array, criteria:
     """
     reference = copy_frozen(reference, len(assembly), 4, 4)
     sound = ReachedState(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
-    contacts = ContactJudge(Meetings(assembly), criteria.thresholds, criteria.clearance_mm)
-    displaced = displacements(assembly, sound, fixtures(assembly))
+    contacts = ContactJudge(ContactMeasurements(assembly), criteria.thresholds, criteria.clearance_mm)
+    displaced = measure_displacements(assembly, sound, list_fixtures(assembly))
     return Verdict(
         criteria.success_means,
         finished=judge_finished(contacts, sound, reference, displaced),

@@ -1,0 +1,1 @@
+"""What is perceived of a demonstration: observed poses, detected contacts, depth images."""

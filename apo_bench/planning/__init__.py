@@ -1,0 +1,1 @@
+"""Planning of insertions from contacts, and prediction of where a plan will fail."""

@@ -28,7 +28,6 @@ from apo_bench.records.methods import (
     uses_contacts,
 )
 from apo_bench.records.outcomes import CODES, STAGES, describe_outcome, describe_touch
-from apo_bench.records.own_code import FAILURES, FOREIGN_ARMS, RESIDUALS
 from apo_bench.records.record import (
     KEY,
     LARGEST_NUMBER,
@@ -80,6 +79,7 @@ from apo_bench.records.settings import (
 )
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
 from apo_bench.records.trial_numbers import EVALUATION_STARTS, FIRST_TRAINING_TRIAL
+from apo_bench.records.user_code import FAILURES, FOREIGN_ARMS, RESIDUALS
 
 __all__ = (
     "CODES",

@@ -5,6 +5,10 @@
 `joints:0.05`       zero of every joint: degrees
 `tool:0.5`          position of the tip on the hand: mm per axis
 `in_hand:0.5/1`     pose of a part in the hand after the grasp: mm along the pads, degrees about their normal
+`sag:0.5`           height of the tip, lost since joints yield to the weight of the arm unseen by encoders: mm
+`base_tilt:0.1`     tilt of the base about its foot: degrees about each level axis
+`finger:0.5`        one finger shorter than the other in the closing direction: mm
+`ft_drift:1`        drift of the force-torque sensor: N a minute per axis, and 0.05 Nm a minute per N
 
 Several kinds are joined by `+`. A robot that probes assumes such an error:
 
@@ -23,7 +27,16 @@ MATCHED = "matched"
 _UNKNOWN = "unknown"
 _LARGEST = 20.0
 """Largest standard deviation, [mm] or [deg]."""
-_UNITS = {"hand_eye": ("mm", "degrees"), "joints": ("degrees",), "tool": ("mm",), "in_hand": ("mm", "degrees")}
+_UNITS = {
+    "hand_eye": ("mm", "degrees"),
+    "joints": ("degrees",),
+    "tool": ("mm",),
+    "in_hand": ("mm", "degrees"),
+    "sag": ("mm",),
+    "base_tilt": ("degrees",),
+    "finger": ("mm",),
+    "ft_drift": ("N a minute",),
+}
 """Kind -> units of its numbers; a second number is optional, with default 0."""
 
 
@@ -34,6 +47,11 @@ class Sigmas(NamedTuple):
     joints_deg: float = 0.0
     tool_mm: float = 0.0
     in_hand: tuple[float, float] = (0.0, 0.0)
+    sag_mm: float = 0.0
+    base_tilt_deg: float = 0.0
+    finger_mm: float = 0.0
+    ft_drift_n: float = 0.0
+    """A minute."""
 
 
 def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
@@ -52,8 +70,8 @@ def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
         require_known(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS))
         require(kind not in sigmas, f"the {called} '{name}' was given, which has {kind} twice; state it once.")
         sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
-    hand_eye, joints, tool, in_hand = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
-    return Sigmas(hand_eye, joints[0], tool[0], in_hand)
+    hand_eye, joints, tool, in_hand, *others = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
+    return Sigmas(hand_eye, joints[0], tool[0], in_hand, *(size for size, _ in others))
 
 
 def normalise_robot_error(name: str) -> str:

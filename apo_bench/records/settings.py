@@ -155,7 +155,8 @@ class TrialConfig:
         default=NO_ROBOT_ERROR,
         metadata=about(
             "Standard deviations of the robot's own errors: none, hand_eye:1/0.2 (mm/degrees), joints:0.05 (degrees), "
-            "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), or several joined by +",
+            "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), sag:0.5 (mm), base_tilt:0.1 (degrees), finger:0.5 (mm), "
+            "ft_drift:1 (N a minute), or several joined by +",
             spelled=normalise_robot_error,
             key=True,
             axis=True,

@@ -1,12 +1,12 @@
 """Scenarios: read and check scenario files, and draw the layout of a trial."""
 
 from apo_bench.scenario.attach_lines import list_nominal_operations
-from apo_bench.scenario.file import find_scenario_path, is_named, list_scenario_names, load_scenario
 from apo_bench.scenario.human_error import NOTHING_M, compute_human_error_covariance, spread_error
 from apo_bench.scenario.layout import draw_layout, find_nominal_start, place_layout
-from apo_bench.scenario.order import find_part_in_the_air
+from apo_bench.scenario.operation_order import find_part_in_the_air
 from apo_bench.scenario.play import check_clearance
 from apo_bench.scenario.scenario import Grasp, HumanError, Scenario, Turn
+from apo_bench.scenario.scenario_file import find_scenario_path, is_named, list_scenario_names, load_scenario
 
 __all__ = (
     "NOTHING_M",

@@ -8,8 +8,8 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.planning.insertion.arrival import Arrival
-from apo_bench.planning.insertion.attach import Preference
-from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
+from apo_bench.planning.insertion.attach_line import Preference
+from apo_bench.planning.insertion.operation_macros import OperationMacros, describe_operation_macros
 from apo_bench.scenario.layout import find_nominal_start
 from apo_bench.scenario.scenario import Scenario
 
@@ -21,7 +21,7 @@ _THROUGH = 1e-3
 def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
     """The planned insertion of every operation of a scenario, at its nominal poses."""
     lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
+    return describe_operation_macros(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
 
 
 def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
@@ -35,7 +35,9 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
         InputError: A stated direction leads through a face that the part touches, or a stated line begins inside
             another part.
     """
-    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated)
+    operations = describe_operation_macros(
+        scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated
+    )
     for each, preference in zip(operations, stated, strict=True):
         _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in operations))

@@ -4,13 +4,13 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import (
-    FINGER_ROOM_M,
+    FINGER_CLEARANCE_M,
     PAD_M,
     Array,
     Solid,
     all_boxes,
     find_holds,
-    holds_whole,
+    holds_whole_width,
     measure_angle,
     measure_extent,
 )
@@ -22,8 +22,8 @@ _RAISED = 0.15
 """Height of a default grasp above the middle of the part, as a fraction of the height of the part."""
 _OPENING_M = 0.046
 """Largest opening of each finger of the default arm."""
-_MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
-"""Largest width of a part for a default grasp; open fingers need `FINGER_ROOM_M` of free space."""
+_MOST_HELD_M = 2 * _OPENING_M - FINGER_CLEARANCE_M
+"""Largest width of a part for a default grasp; open fingers need `FINGER_CLEARANCE_M` of free space."""
 MOST_TILT_DEG = 45.0
 """Largest tilt of the gripper from straight down."""
 _LEVEL = 1e-6
@@ -106,7 +106,7 @@ def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Gras
 
 def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
     """True if the part consists of boxes and lies between the pads; T is its pose (4, 4) when it is picked."""
-    return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(T[2, :3], 9))
+    return all_boxes(solid.pieces) and holds_whole_width(solid.pieces, grasp.point, grasp.across, np.round(T[2, :3], 9))
 
 
 def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, solid: Solid, T: Array) -> Grasp:

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, freeze, make_copyable, pose
-from apo_bench.planning.insertion.attach import Attach
+from apo_bench.planning.insertion.attach_line import Attach
 from apo_bench.records import Meaning, Thresholds
 
 

@@ -11,9 +11,10 @@ from apo_bench.geometry import Array
 
 def frame(R: ArrayLike, position: ArrayLike) -> Array:
     """The pose of a rotation, (3, 3) or (9,), and a position, (3,); as (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3] = np.reshape(R, (3, 3))
+    T = np.zeros((4, 4))
+    T[:3, :3] = np.asarray(R).reshape(3, 3)
     T[:3, 3] = position
+    T[3, 3] = 1.0
     return T
 
 
@@ -29,6 +30,20 @@ def quaternion(T: Array) -> Array:
     q = np.zeros(4)
     mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
     return q
+
+
+def rotation_vector(R: Array) -> Array:
+    """The rotation vector, (3,), [rad], of a rotation matrix, (3, 3); at most a half turn long."""
+    vector = np.zeros(3)
+    mujoco.mju_quat2Vel(vector, quaternion(R), 1.0)
+    return vector
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors, (3,); `np.cross` is slow on a single pair."""
+    product = np.zeros(3)
+    mujoco.mju_cross(product, a, b)
+    return product
 
 
 def body_frame(data: Any, body: int) -> Array:

@@ -27,17 +27,17 @@ from apo_bench.assembly import (
     compute_placements,
     project_observation,
 )
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM
 from apo_bench.correction.robust.hypotheses import UNKNOWN, soft_deviation
 from apo_bench.correction.solvers import factor_noise, linearise_by, unwhiten_twists
 from apo_bench.geometry import Array, Face, pose
-from apo_bench.perception.detection.belief import Belief
-from apo_bench.perception.detection.candidate import judge_pair
-from apo_bench.perception.detection.thresholds import Rules, reality
-from apo_bench.planning.insertion.attach import Attach
-from apo_bench.planning.prediction.resting import enters
+from apo_bench.perception.detection.candidate import make_candidate
+from apo_bench.perception.detection.kalman_filter import PoseBelief
+from apo_bench.perception.detection.thresholds import Rules, compute_contact_covariance
+from apo_bench.planning.insertion.attach_line import Attach
+from apo_bench.planning.prediction.rest_poses import is_insertion
 from apo_bench.records import GIVEN, WRONG_CONTACTS, Thresholds, parse_face_offset
 from apo_bench.trial.free_directions import FreeSpace
 
@@ -64,7 +64,7 @@ UNKNOWN_SOURCE = ContactRates(0.3, 0.3, 0.3)
 """Of a source of contacts that states nothing."""
 _SURE = 0.98
 """Probability of the error that a source is known to make."""
-_RULES = Rules(miss=1e-3)
+_RULES = Rules(miss_rate=1e-3)
 """Gaps and angles within which faces may be a missing contact."""
 _FALSE_M = 8e-3
 """Standard deviation of the gap of faces that are taken for a contact."""
@@ -142,7 +142,7 @@ class Judged(NamedTuple):
             gap_m: Any shape.
         """
         face = assembly.face_of(contact.environment)
-        inserted = enters(assembly, contact)
+        inserted = is_insertion(assembly, contact)
         if isinstance(face, Face):
             normal = placed[contact.environment.part][:3, :3] @ face.normal
             way = main[:3, :3] @ self.attach[made].direction
@@ -166,25 +166,27 @@ def missing_contacts(believed: Observation, space: FreeSpace, judged: Judged) ->
     assembly = believed.assembly
     n = len(assembly)
     reach = space.twists.reshape(6 * n, -1)
-    belief = Belief(assembly, believed.start, space.poses, reach @ reach.T)
+    belief = PoseBelief(assembly, believed.start, space.poses, reach @ reach.T)
     standing = set(assembly.fixed)
     count = len(assembly.relations())
     bounds: Any = {"gap_m": _RULES.gap_m, "angle_rad": _RULES.angle_rad, "share": _RULES.share}
     for k, operation in enumerate(assembly.operations):
-        now = belief.standing(k)
+        now = belief.parts_after(k)
         for a in operation.moves:
             for b in sorted(standing - set(operation.moves)):
                 J = now.reach[a] - now.reach[b]
                 if not J.any():
                     continue
-                for pair in facing(assembly.solids[a], now.poses[a], assembly.solids[b], now.poses[b], **bounds):
+                for pair in find_facing_pairs(
+                    assembly.solids[a], now.poses[a], assembly.solids[b], now.poses[b], **bounds
+                ):
                     slope = pair.slope @ J
                     C = slope @ belief.covariance @ slope.T
-                    found = judge_pair(believed, _RULES, a, b, now.poses[b], pair, slope, C)
+                    found = make_candidate(believed, _RULES, a, b, now.poses[b], pair, slope, C)
                     if found is None or found.contact in operation.contacts:
                         continue
                     m = pair.lengths
-                    S = (C + reality(pair, assembly.play(found.contact, believed.play_m)))[:m, :m]
+                    S = (C + compute_contact_covariance(pair, assembly.play(found.contact, believed.play_m)))[:m, :m]
                     e = pair.residual[:m]
                     # likelihood of a closed pair over that of one anywhere within the bounds
                     scaled = 2.0 * np.pi * S / (2.0 * _RULES.gap_m) ** 2

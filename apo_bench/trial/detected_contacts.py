@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.perception.detection.contacts import detect_contacts
 from apo_bench.perception.detection.evidence import DetectedContacts
-from apo_bench.perception.detection.jointly import detect_contacts_jointly
+from apo_bench.perception.detection.greedy_detection import detect_contacts
+from apo_bench.perception.detection.joint_detection import detect_contacts_jointly
 
 
 def detect_by(observation: Observation, source: str = "detected") -> DetectedContacts:

@@ -13,7 +13,7 @@ from apo_bench.formats.observation_json import OBSERVATION_SCHEMA
 from apo_bench.formats.plan_json import PLAN_SCHEMA
 from apo_bench.records import RECORD_SCHEMA, TrialConfig
 from apo_bench.scenario import Scenario
-from apo_bench.trial.inputs import content_pieces, digest, noise_content, own_content
+from apo_bench.trial.input_files import content_pieces, digest, noise_content, own_content
 
 _SCHEMAS = (RECORD_SCHEMA, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 _PACKAGES = (

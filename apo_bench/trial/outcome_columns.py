@@ -14,11 +14,11 @@ from apo_bench.assembly import (
 )
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.wrong_contacts import culprit
+from apo_bench.perception.observation.wrong_contacts import find_wrong_relation
 from apo_bench.records import GraspSlip, TrialRecord, replace_infinite
 from apo_bench.trial.planning import MethodResult
 from apo_bench.trial.pose_error import goal_errors, pose_errors
-from apo_bench.trial.stages import Attempt
+from apo_bench.trial.trial_stages import Attempt
 
 
 def confidence_columns(
@@ -32,7 +32,9 @@ def confidence_columns(
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
     right = observation.assembly
-    wrong: TrialRecord = {"wrong_contact": None if given.assembly is right else culprit(right, given.assembly)}
+    wrong: TrialRecord = {
+        "wrong_contact": None if given.assembly is right else find_wrong_relation(right, given.assembly)
+    }
     return wrong | _test(result.correction) | _truth(result, right, given, truth)
 
 

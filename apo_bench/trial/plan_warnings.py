@@ -3,7 +3,7 @@
 import numpy as np
 
 from apo_bench.assembly import Correction, Plan
-from apo_bench.planning.prediction.failure import predict
+from apo_bench.planning.prediction.first_failure import predict_failure
 from apo_bench.scenario import Scenario, place_layout
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene import build_scene
@@ -22,7 +22,7 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
     test = None if correction is None else correction.test_after or correction.test
     if test is not None and not test.passes:
         sentences.append(f"the stated noise does not explain the correction (p = {test.p_value:.2g})")
-    prediction = predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach)
+    prediction = predict_failure(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach)
     if prediction.fails:
         sentences.append(f"predicted: {prediction.sentence}")
     return "; ".join(sentences)
@@ -45,7 +45,7 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
         at = place_layout(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
         plan = Plan(scenario.assembly, at.start, at.poses)
     moves = arm_moves(plan, scene)
-    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
+    prediction = predict_failure(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
     margins = [move.margin_deg for move in moves if move.margin_deg is not None]
     room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not prediction.fails else ""
     return f"{arm}: {prediction.sentence}{room}"

@@ -10,9 +10,9 @@ from apo_bench.geometry import Array
 from apo_bench.records import resolve_simulated
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fitting import FittingPlan, fit_plan
-from apo_bench.trial.nominal import fit_nominal_poses
-from apo_bench.trial.stages import observation_failure
+from apo_bench.trial.nominal_poses import fit_nominal_poses
+from apo_bench.trial.plan_fitting import FittingPlan, fit_plan
+from apo_bench.trial.trial_stages import observation_failure
 
 
 @final

@@ -4,7 +4,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Poses, ReachedState, build_contact_equations
 from apo_bench.correction.solvers import LENGTH_M
-from apo_bench.geometry import Array, find_least_turned, pose
+from apo_bench.geometry import Array, find_least_rotated_pose, pose
 
 _RANK_CUT_OFF = 1e-7
 """Relative cut-off: at consistent poses singular values of free directions are rounding, the others far larger."""
@@ -55,9 +55,9 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """`goals` with parts of revolution rotated about their axes nearest to the truth, unless they carry others."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
-    return np.array([T if solid is None else find_least_turned(solid, T, true) for solid, T, true in pairs]).reshape(
-        -1, 4, 4
-    )
+    return np.array(
+        [T if solid is None else find_least_rotated_pose(solid, T, true) for solid, T, true in pairs]
+    ).reshape(-1, 4, 4)
 
 
 def _rms_mm(error: Array, operations: int) -> float:

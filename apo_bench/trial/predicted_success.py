@@ -23,13 +23,13 @@ from scipy.special import ndtr, ndtri
 from apo_bench.assembly import Assembly, Contact, Correction, Observation, Outcome, Plan, Poses, compute_placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.finished import least_overlaps
-from apo_bench.planning.prediction.measures import (
+from apo_bench.judging.finished_assembly import compute_least_overlaps
+from apo_bench.planning.prediction.plan_measures import (
     ArmMove,
     DrawnMeasure,
     Measure,
-    drawn_measures,
-    measures,
+    measure_drawn_plans,
+    measure_plan,
 )
 from apo_bench.records import GIVEN, NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
@@ -283,13 +283,14 @@ def _exchange(assembly: Assembly, k: int, change: Callable[[tuple[Contact, ...]]
 def _by_arm(
     plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
 ) -> tuple[tuple[Poses, ...], tuple[ArmMove, ...]]:
-    """Poses of parts placed by robots with drawn errors, as `drawn_measures` takes them, and the motions of the arm.
+    """Poses of parts placed by robots with drawn errors, as `measure_drawn_plans` takes them, and the motions of the
+    arm.
 
     The poses are empty if the robot has no errors, or if a pose is out of reach.
     """
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought, left_after_feeling, stack_errors
-    from apo_bench.trial.stages import robot_error_of
+    from apo_bench.trial.trial_stages import robot_error_of
 
     arm = arm_moves(plan, scene, spiral)
     slip = parse_robot_error(robot_error).in_hand
@@ -436,11 +437,11 @@ class _Shares:
             judged = self.judged
             plan = self.plan if assembly is self.plan.assembly else replace(self.plan, assembly=assembly)
             lengths = judged.clearance_mm, judged.thresholds, judged.attach
-            planned = list(measures(plan, *lengths, arm=self._arm))
+            planned = list(measure_plan(plan, *lengths, arm=self._arm))
             stands = math.prod(_FALLS for each in planned if each.kind in _WEIGHED and each.exceeded)
             others: Iterable[Measure | DrawnMeasure] = (each for each in planned if each.kind not in _WEIGHED)
             if self._ends:
-                others = drawn_measures(plan, *lengths, self._arm, self._ends)
+                others = measure_drawn_plans(plan, *lengths, self._arm, self._ends)
             # What is neglected is the same for all measures, so the worst one decides.
             worst = np.array([self._within(each) for each in others]).min(axis=0, initial=1.0)
             self._known[assembly] = stands, float(worst.mean())
@@ -461,7 +462,7 @@ class _Shares:
             assembly: With the contacts that count.
             truths: (count, n, 4, 4), possible true poses.
         """
-        overlaps = least_overlaps(assembly, self._final, truths)
+        overlaps = compute_least_overlaps(assembly, self._final, truths)
         possible = overlaps[np.isfinite(overlaps)]  # without truths in which faces do not meet
         if not len(possible):
             return _UNKNOWN

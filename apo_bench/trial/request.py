@@ -26,12 +26,12 @@ from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
-from apo_bench.trial.endings import record_lost_trial
 from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.keywords import expand_noise_level
+from apo_bench.trial.record_start_and_end import record_lost_trial
 from apo_bench.trial.rollout import Rollout, trial_story
 from apo_bench.trial.run import MEASURED, noise_of, record_trial, run_measured
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     SimulatedDemonstration,
     demonstration_failure,
     demonstration_of,

@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.prediction.resting import resting_poses
+from apo_bench.planning.prediction.rest_poses import predict_rest_poses
 from apo_bench.simulation.execution import Grip, compute_transferred_poses, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
@@ -32,8 +32,8 @@ def stack_errors(errors: Sequence[RobotError]) -> RobotError:
 
     Every array gets a leading axis r, except `in_hand`, which becomes (operations, r, 4, 4).
     """
-    hand_eye, joints, tool, in_hand = (np.array([getattr(each, name) for each in errors]) for name in _ERRORS)
-    return RobotError(hand_eye, joints, tool, in_hand.swapaxes(0, 1))
+    stacked = {name: np.array([getattr(each, name) for each in errors]) for name in _ERRORS}
+    return RobotError(**{**stacked, "in_hand": stacked["in_hand"].swapaxes(0, 1)})
 
 
 def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -> tuple[Poses, ...]:
@@ -56,20 +56,22 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
             error.hand_eye @ _leant(scene, solve_key_angles(t, scene).reached[i], error) for i in (_PICK, -1)
         ]
         last = t.grips[-1].T_part_tip
-        held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.tool, resting[t.part])
+        held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.pads, resting[t.part])
         # part pose at release
-        put = let_go @ t.T_world_goal @ last @ error.tool @ error.in_hand[k] @ held @ pose.inverse(last)
+        put = let_go @ t.T_world_goal @ last @ error.pads @ error.in_hand[k] @ held @ pose.inverse(last)
         now = compute_transferred_poses(operation, put, resting)
         if move.step.undo:
             resting = now
             continue
         floats = pose.at(t.floats * _UP) if t.into.level else np.eye(4)
         states.append(compute_transferred_poses(operation, floats @ put, resting))
-        resting = resting_poses(plan.assembly, operation, now)
+        resting = predict_rest_poses(plan.assembly, operation, now)
         for grip in t.centring:
-            tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.tool
+            tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.pads
             centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
-            resting = resting_poses(plan.assembly, operation, compute_transferred_poses(operation, centred, resting))
+            resting = predict_rest_poses(
+                plan.assembly, operation, compute_transferred_poses(operation, centred, resting)
+            )
     return tuple(states)
 
 
@@ -108,9 +110,10 @@ def _held(grip: Grip, tip: Array, T_part: Array) -> Array:
 
 
 def _leant(scene: Scene, q: Array, error: RobotError) -> Array:
-    """World displacement of the tip due to wrong joint zeros at joint angles q, (*, 4, 4)."""
-    if not error.joints.any():
+    """World displacement of the tip due to wrong joint zeros and sag at joint angles q, (*, 4, 4)."""
+    if not (error.joints.any() or error.sag.any()):
         return np.eye(4)
     right = pose.inverse(scene.kinematics.forward(q))
-    wrong = [scene.kinematics.forward(q + each) for each in error.joints.reshape(-1, len(q))]
-    return np.asarray(np.array(wrong).reshape(*error.joints.shape[:-1], 4, 4) @ right)
+    off = error.joints - error.sag * scene.kinematics.gravity_torque(q)
+    wrong = [scene.kinematics.forward(q + each) for each in off.reshape(-1, len(q))]
+    return np.asarray(np.array(wrong).reshape(*off.shape[:-1], 4, 4) @ right)

@@ -12,10 +12,10 @@ from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
 from apo_bench.scenario.layout import place_layout
 from apo_bench.simulation.film.track import FilmTrack, Segment, scenario_segment
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.stages import SimulatedDemonstration, watch_again
+from apo_bench.trial.trial_stages import SimulatedDemonstration, watch_again
 
 # Names of the poses in a rollout.
-AS_SEEN = "as seen"
+AS_OBSERVED = "as observed"
 AS_CORRECTED = "as corrected"
 AS_TRUE = "true"
 
@@ -30,7 +30,7 @@ class Rollout:
     assembled: Poses
     """Final poses that are right, or as planned if the truth is not known."""
     poses: Mapping[str, Array] = field(default_factory=dict)
-    """Name, such as `as seen` -> (n, 4, 4), world frame, [m]."""
+    """Name, such as `as observed` -> (n, 4, 4), world frame, [m]."""
 
 
 def scenario_story(scene: Scene) -> Rollout:
@@ -61,7 +61,7 @@ def trial_story(
     assert plan is not None
     method = record["method"]
     start = plan.start
-    goals = {AS_SEEN: seen.poses, AS_CORRECTED: plan.target_poses}
+    goals = {AS_OBSERVED: seen.poses, AS_CORRECTED: plan.target_poses}
     if method == "uncorrected" or np.array_equal(seen.poses, plan.target_poses):
         del goals[AS_CORRECTED]
     segments = []

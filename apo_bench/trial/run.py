@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast, final
 
+import numpy as np
+
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Plan
 from apo_bench.correction.calibration import UNKNOWN, compute_slip_sigmas, make_prior_estimate
@@ -40,14 +42,14 @@ from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, Probi
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
-from apo_bench.trial.endings import end_record, record_misbehaviour, start_record
 from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.keywords import configure_trial
-from apo_bench.trial.nominal import move_nominal_poses
+from apo_bench.trial.nominal_poses import move_nominal_poses
 from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import abstain, predict_success
-from apo_bench.trial.stages import (
+from apo_bench.trial.record_start_and_end import end_record, record_misbehaviour, start_record
+from apo_bench.trial.trial_stages import (
     CONTACT_SOURCE,
     WRENCH,
     SimulatedDemonstration,
@@ -293,8 +295,9 @@ def probing_config(
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if assumed is None else parse_robot_error(assumed)
-    estimate = make_prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions)
+    middle = plan.target_poses[:, :3, 3].mean(axis=0)
+    estimate = make_prior_estimate(sigmas, len(scene.arm.joints), middle, np.array(scene.arm.base), sigmas.sag_mm > 0.0)
+    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions, 0.5e-3 * sigmas.finger_mm)
 
 
 def record_trial(

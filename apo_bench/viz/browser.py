@@ -17,7 +17,7 @@ from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
 from apo_bench.simulation.film.window import PICTURE_S
 from apo_bench.simulation.scene import make_initial_state
 from apo_bench.trial.rollout import Rollout
-from apo_bench.viz.stepping import start_at_end
+from apo_bench.viz.rollout_cursor import start_at_end
 
 HOST = "127.0.0.1"
 PORT = 8080

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.io import save_figure, use_figure_style
-from apo_bench.perception.depth_camera.follow import Event
+from apo_bench.perception.depth_camera.operation_detection import DetectedOperation
 from apo_bench.perception.depth_camera.range_finder import VIEWS
 from apo_bench.viz.depth_run import DepthRun
 
@@ -45,7 +45,7 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     save_figure(figure, out, dpi=72)
 
 
-def _describe(event: Event) -> str:
+def _describe(event: DetectedOperation) -> str:
     """Return the label of an event: `3: cube, 97 % explained`."""
     moved = ", ".join(sorted(event.moved)) or "nothing"
     if event.operation is None:
@@ -54,7 +54,7 @@ def _describe(event: Event) -> str:
     return f"{event.operation + 1}: {moved}, {found}"
 
 
-def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
+def _draw_row(row: Any, run: DepthRun, event: DetectedOperation, view: int) -> None:
     """Draw the five pictures of `_TITLES` for one event into a row of axes."""
     from matplotlib.colors import ListedColormap
 
@@ -72,5 +72,5 @@ def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
     if event.found is not None and event.model is not None:
         # outline the pixels whose rays hit the model at the estimated pose
         camera = VIEWS[view]
-        distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
+        distance, _ = run.models(event.model.place_parts(event.found.T), camera.origin, camera.rays)
         row[4].contour(np.isfinite(distance.reshape(after.shape)), levels=[0.5], colors=_OUTLINE, linewidths=1.2)

@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.depth_camera.follow import Event
+from apo_bench.perception.depth_camera.operation_detection import DetectedOperation
 from apo_bench.records import DEPTH_CAMERA, check
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.rays import ModelRays
 from apo_bench.simulation.sensor.watch import DemonstrationImages
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     OBSERVATION,
     SimulatedDemonstration,
     demonstration_failure,
@@ -44,7 +44,7 @@ class DepthRun(NamedTuple):
     watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured depth images, (views, height, width) each, [m]."""
-    events: tuple[Event, ...]
+    events: tuple[DetectedOperation, ...]
     models: ModelRays
     """Casts rays at models of the parts, which are smaller by the clearance as the real parts are."""
 
@@ -70,8 +70,8 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
     if simulated.demonstration.code != "ok" or simulated.images is None:
         raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed.")
     sensor = range_sensor(scene, simulated, noise_mm)
-    images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
-    events = sensor.events(simulated.demonstration, images)
+    images = tuple(sensor.add_noise(stream(seed, OBSERVATION)))
+    events = sensor.detect_operations(simulated.demonstration, images)
     models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
     return DepthRun(scene.scenario.name, simulated, simulated.images, images, events, models)
 

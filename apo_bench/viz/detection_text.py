@@ -53,9 +53,9 @@ def detection_form(
             | {
                 "observed_gap_mm": _to_mm(each.seen_gap_m),
                 "gap_mm": _to_mm(each.gap_m),
-                "allowed_gap_mm": _to_mm(each.most.gap_m),
+                "allowed_gap_mm": _to_mm(each.largest_distance.gap_m),
                 "angle_deg": degrees(each.angle_rad),
-                "allowed_angle_deg": degrees(each.most.angle_rad),
+                "allowed_angle_deg": degrees(each.largest_distance.angle_rad),
                 "overlap": each.share,
                 "in_scenario": (each.made, each.contact) in right,
             }

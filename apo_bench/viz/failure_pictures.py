@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Contact, Poses, list_outline_points
-from apo_bench.benchmark.report.pictures import FailurePicture
+from apo_bench.benchmark.report.failure_choice import FailurePicture
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.io import read_lines
@@ -55,9 +55,9 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePic
     """Draw the final poses of a failed trial, with an arrow at the contact that failed."""
     import imageio.v3 as iio
 
-    from apo_bench.scenario.file import is_named
+    from apo_bench.scenario.scenario_file import is_named
     from apo_bench.simulation.scene.render import draw_picture
-    from apo_bench.trial.stages import scene_of
+    from apo_bench.trial.trial_stages import scene_of
 
     name = record["scenario"]
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")

@@ -26,13 +26,13 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     """
     from matplotlib.figure import Figure
 
-    upright = residuals.upright
+    upright = residuals.is_upright
     shift = measured.shift_mm
     turn = measured.turn_deg
     columns = (
         ("across the ray [mm]", residuals.across_mm[upright], shift.cdf_across, shift.limit),
         ("along the ray, size [mm]", residuals.along_mm[upright], shift.cdf_along, shift.limit),
-        ("turn [deg]", residuals.angle_deg[residuals.turn_known], turn.cdf_length, turn.limit),
+        ("turn [deg]", residuals.angle_deg[residuals.has_rotation_error], turn.cdf_length, turn.limit),
     )
     figure = Figure(figsize=(11.0, 6.6), layout="constrained")
     axes = figure.subplots(2, 3)

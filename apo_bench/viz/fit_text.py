@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.geometry import Array
 from apo_bench.io import align_columns
-from apo_bench.perception.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
-from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, Split
+from apo_bench.perception.observation.fitting.fit import PERCENTILES, GoodnessOfFit, count_outliers_by_score
+from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, TruncatedTails
 from apo_bench.viz.form_text import fact_lines
 
 _SCHEMA = "apo-bench/noise-fit/2"
@@ -17,11 +17,11 @@ _NOTED = ("parts", "images", "distance_mm", "found", "left_over", "turned", "tur
 """Keys of a form that the notes of a noise file state."""
 
 
-def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
+def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[GoodnessOfFit]) -> dict[str, Any]:
     """Return counts and fits as a JSON object: mm and degrees; degrees of freedom are null for a Gaussian."""
-    inlier = residuals.inlier
-    turned = inlier & ~residuals.upright  # inliers with a rotation error beyond TURNED_DEG
-    shift = residuals.shift_mm[residuals.upright]
+    inlier = residuals.is_inlier
+    turned = inlier & ~residuals.is_upright  # inliers with a rotation error beyond TURNED_DEG
+    shift = residuals.shift_mm[residuals.is_upright]
     across = max(float(np.median(residuals.across_mm[inlier])), 1e-9)  # never 0, since it is a divisor below
     return {
         "schema": _SCHEMA,
@@ -29,14 +29,14 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
         "parts": len(residuals.where),
         "images": len(np.unique(residuals.where[:, :2], axis=0)),
         "distance_mm": residuals.distance_mm,
-        "found": int(residuals.found.sum()),
+        "found": int(residuals.is_estimated.sum()),
         "missed_rate": measured.missed,
         "left_over": residuals.surplus,
         "of_absent_objects": residuals.absent,
         "inliers": int(inlier.sum()),
         "outlier_rate": measured.outliers,
         "outlier_farthest_mm": measured.farthest_mm,
-        "outliers_by_score": [band._asdict() for band in outliers_by_score(residuals)],
+        "outliers_by_score": [band._asdict() for band in count_outliers_by_score(residuals)],
         "turned": int(turned.sum()),
         "turned_and_off": int((measured.shift_mm.cdf_across(residuals.across_mm[turned]) > 1.0 - _RARE).sum()),
         "round_objects": list(residuals.round_objects),
@@ -97,7 +97,7 @@ def _percentiles(values: Array) -> list[float]:
     return list(map(float, np.percentile(values, PERCENTILES)))
 
 
-def _split_form(split: Split) -> dict[str, Any]:
+def _split_form(split: TruncatedTails) -> dict[str, Any]:
     """Return the fitted distributions across and along the ray as a JSON object."""
     return {"limit": split.limit} | {
         name: {"scale": t.scale, "degrees_of_freedom": t.freedom if np.isfinite(t.freedom) else None}

@@ -83,7 +83,7 @@ def draw_graph(
         _draw_arrow(axes, places[arc.manipulated], places[arc.environment], color, style, label)
     for node in graph.nodes:
         face = [_PALE + (1 - _PALE) * c for c in colors[node.part]] if node.part in colors else _GROUND
-        _draw_node(axes, node, places[node], face, graph.stands(node))
+        _draw_node(axes, node, places[node], face, graph.is_current(node))
     save_figure(figure, path, dpi=110)
 
 

@@ -15,7 +15,7 @@ def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str
         residuals: Residual of each arc, [m]; None where it is unknown.
         gap_m: Largest residual of a contact that holds, [m].
     """
-    nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
+    nodes = [(str(node), "" if graph.is_current(node) else "moved on") for node in graph.nodes]
     arcs = []
     for arc, residual in zip(graph.arcs, residuals, strict=True):
         lost = "" if arc.lost is None else f", lost at {arc.lost + 1}"
@@ -31,7 +31,7 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str
         "schema": _SCHEMA,
         "scenario": scenario,
         "step": graph.step,
-        "nodes": [_node_form(node) | {"stands": graph.stands(node)} for node in graph.nodes],
+        "nodes": [_node_form(node) | {"stands": graph.is_current(node)} for node in graph.nodes],
         "arcs": [
             {
                 "name": arc.name,

@@ -11,9 +11,9 @@ from apo_bench.geometry import Array, pose
 from apo_bench.names import resolve
 from apo_bench.perception.observation.models import Camera, Facts
 from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
-from apo_bench.perception.observation.noise_file import noise_path, presets, read_noise
-from apo_bench.perception.observation.observing import observe
-from apo_bench.scenario.file import load_scenario
+from apo_bench.perception.observation.noise_file import find_noise_path, list_presets, read_noise
+from apo_bench.perception.observation.observe import observe
+from apo_bench.scenario.scenario_file import load_scenario
 
 SCENARIO = "stick_in_tower"
 _DRAWS = 1000
@@ -35,7 +35,7 @@ class ErrorSample(NamedTuple):
 
 def list_models() -> Mapping[str, str]:
     """Return name -> title of every noise model that has a name."""
-    measured = {name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()}
+    measured = {name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in list_presets().items()}
     return {name: find_facts(name).title for name in NOISES} | measured
 
 
@@ -122,5 +122,5 @@ def _resolve_model(model: Any) -> Any:
 
     Measured models and camera failures are made at noise level 1; other models stay classes or objects.
     """
-    known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
+    known = isinstance(model, str) and (find_noise_path(model) is not None or model.partition(":")[0] in FAILURES)
     return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

@@ -13,7 +13,7 @@ from apo_bench.assembly import Plan, compute_placements, spell
 from apo_bench.formats.json_forms import pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.io import align_columns, format_direction
-from apo_bench.planning.insertion.arrival import Arrival, turning_state
+from apo_bench.planning.insertion.arrival import Arrival, compute_screw_state
 from apo_bench.planning.insertion.macros import Macro
 from apo_bench.planning.insertion.operation_macros import OperationMacros
 from apo_bench.scenario import Grasp, Scenario, find_nominal_start, list_nominal_operations
@@ -94,7 +94,7 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
     forms = []
     for line in lines:
         stage = stages[line.operation if line.undo else line.operation + 1]  # where the parts stand after the step
-        screw = turning_state(scenario.assembly, line.comes, stage)
+        screw = compute_screw_state(scenario.assembly, line.comes, stage)
         position, guarded, across = (axes.tolist() for axes in line.comes.axes)
         target = {"position_mm": None, "quaternion_wxyz": None} if line.target is None else pose_form(line.target)
         departs = [_macro_form(line.leaves, macro) for macro in line.leaves.departs]
@@ -169,7 +169,7 @@ def _macro_form(arrival: Arrival, macro: Macro) -> dict[str, Any]:
     return {
         "name": macro.name,
         "direction": macro.direction.tolist(),
-        "direction_in_part": arrival.own(macro.direction).tolist(),
+        "direction_in_part": arrival.to_part_frame(macro.direction).tolist(),
         "length_mm": None if macro.length_m is None else round(1e3 * macro.length_m, 6),
         "guarded": macro.guarded,
         "contacts": [str(contact) for contact in arrival.contacts(macro)],

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import (
-    Meetings,
+    ContactMeasurements,
     Observation,
     Poses,
     build_relation_graph,
@@ -58,7 +58,7 @@ def poses_panel(title: str, observation: Observation, poses: Array, step: int, w
         if e > observation.gap_m:
             wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
     for arc in graph.arcs:
-        common = Meetings(assembly).measure_overlaps((contact, placed) for contact in arc.contacts)
+        common = ContactMeasurements(assembly).measure_overlaps((contact, placed) for contact in arc.contacts)
         if arc.lost is None and not all(common):
             wrong.append(f"{arc}: no overlap")
     return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)

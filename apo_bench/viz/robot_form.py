@@ -127,7 +127,7 @@ def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> l
     end = here
     for macro in line.leaves.departs:
         begin = end
-        way = here[:3, :3] @ line.leaves.own(macro.direction)
+        way = here[:3, :3] @ line.leaves.to_part_frame(macro.direction)
         end = _shift(begin, way, macro.length_m or _GUARDED_FROM_M)
         motions.append(_motion(macro.name, False, begin, end, way, grip, frames))
     return motions
@@ -146,7 +146,7 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
         return [_motion("put down", False, _shift(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames)]
     motions = []
     begin = goal
-    ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]
+    ways = [goal[:3, :3] @ line.comes.to_part_frame(macro.direction) for macro in macros]
     # the first motion along the insertion axis has its travel; others have the length of their macro
     along = next((i for i, way in enumerate(ways) if way @ axis > _ALONG), None)
     # from the goal backwards, since only the last pose is known

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.assembly import Layout, build_relation_graph, compute_joint_play_mm, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.io import join_words
-from apo_bench.judging.finished import fixtures
+from apo_bench.judging.finished_assembly import list_fixtures
 from apo_bench.records import Thresholds
 from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
 from apo_bench.viz.form_text import format_value
@@ -94,7 +94,7 @@ def _describe_verdict(scenario: Scenario) -> dict[str, str]:
         "Clearance per side": f"{scenario.clearance_mm:g} mm",
         "Thresholds": format_value(changed) if changed else "",
         "Allowed gaps beyond the clearance": "; ".join(wider),
-        "Fixtures": join_words(sorted(fixtures(scenario.assembly))),
+        "Fixtures": join_words(sorted(list_fixtures(scenario.assembly))),
     }
 
 

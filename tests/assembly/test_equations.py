@@ -105,7 +105,7 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
 
 
 def with_free(system: Equations, free: set[int] | None) -> Equations:
-    return system if free is None else system.among(system.containing(free))
+    return system if free is None else system.among(system.contacts_with(free))
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_every_arc_is_in_the_graph_with_its_equations(name: str) -> None:
         for i, arc in enumerate(graph.arcs):
             assert {arc.manipulated, arc.environment} <= set(graph.nodes)
             if arc.lost is None:
-                assert graph.stands(arc.manipulated)
-                assert graph.stands(arc.environment)
+                assert graph.is_current(arc.manipulated)
+                assert graph.is_current(arc.environment)
             assert arc.operations == made[arc.name].arcs[i].operations
         assert sum(len(arc.contacts) for arc in graph.arcs) == len(assembly.first(step).relations())

@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import Contact, Meetings, Poses, classify_contact, compute_joint_play_mm, compute_placements
+from apo_bench.assembly import (
+    Contact,
+    ContactMeasurements,
+    Poses,
+    classify_contact,
+    compute_joint_play_mm,
+    compute_placements,
+)
 from apo_bench.geometry import measure_intrusion_depths, pose
-from apo_bench.judging.contacts import ContactCase, ContactJudge
-from apo_bench.planning.prediction.interference import physical_solids
+from apo_bench.judging.contact_limits import ContactCase, ContactJudge
+from apo_bench.planning.prediction.interference import make_physical_solids
 from apo_bench.records import Thresholds
 from tests.end_states import CASTLES, CLEARANCE_MM
 from tests.shipped import TILTED
@@ -88,7 +95,7 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
     """
     contacts = pair[0]
     moved, rests = (end.part for end in contacts[0])
-    solids = physical_solids(scenario.assembly, scenario.clearance_mm)
+    solids = make_physical_solids(scenario.assembly, scenario.clearance_mm)
 
     def after(share: float) -> Poses:
         return {**start, moved: start[moved] @ pose.exp(share * motion)}
@@ -111,7 +118,7 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
 
 def touching(scenario: Scenario, pair: Pair, poses: Poses) -> dict[Contact, bool]:
     contacts, made, true = pair
-    judge = ContactJudge(Meetings(scenario.assembly), Thresholds(), scenario.clearance_mm)
+    judge = ContactJudge(ContactMeasurements(scenario.assembly), Thresholds(), scenario.clearance_mm)
     verdicts = judge.verdicts([ContactCase(c, made, "made", poses, true) for c in contacts])
     return {verdict.contact: verdict.touching for verdict in verdicts}
 

@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 from apo_bench import load_scenario
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.scenario_file import list_scenario_names
 from benchmarks.baselines import COLUMNS, Place, difficulty, read_counts
 from benchmarks.provenance import trials_of
 

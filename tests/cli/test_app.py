@@ -12,7 +12,7 @@ import pytest
 from apo_bench.cli import app as cli
 from apo_bench.cli.method import METHODS as DESCRIBED
 from apo_bench.records import METHODS, RECORD_SCHEMA
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.scenario_file import list_scenario_names
 
 SEEN = Path(__file__).parents[2] / "docs" / "seen.csv"
 TRIAL = ("run", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "uncorrected")
@@ -133,14 +133,14 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
 def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dataclasses import replace
 
-    from apo_bench.trial import stages
+    from apo_bench.trial import trial_stages
 
     def fails(*arguments: Any) -> Any:
         simulated = record(*arguments)
         return replace(simulated, demonstration=replace(simulated.demonstration, code="demonstration_failed"))
 
-    record = stages.simulate_demonstration
-    monkeypatch.setattr(stages, "simulate_demonstration", fails)
+    record = trial_stages.simulate_demonstration
+    monkeypatch.setattr(trial_stages, "simulate_demonstration", fails)
     code, out, _ = run(capsys, *TRIAL, "--json")
     assert code == 1
     assert json.loads(out)["success"] is None

@@ -16,7 +16,7 @@ from apo_bench.cli.shared.help import OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.records.contact_sources import checked_contact_source
 from apo_bench.records.methods import checked_method
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.scenario_file import list_scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
 

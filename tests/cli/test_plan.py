@@ -13,9 +13,9 @@ from apo_bench.assembly import Step
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
 from apo_bench.io import format_direction
-from apo_bench.planning.insertion.operation_macros import understand
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.planning.insertion.operation_macros import describe_operation_macros
 from apo_bench.scenario.layout import find_nominal_start
+from apo_bench.scenario.scenario_file import list_scenario_names
 from apo_bench.viz.plan_text import describe_plan, plan_lines
 from tests import scenes
 
@@ -104,7 +104,7 @@ def nominal(scenario: Scenario) -> Plan:
 
 def unstated(scenario: Scenario) -> list[tuple[str, list[str]]]:
     """States and macros found without any stated line of attach."""
-    found = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses)
+    found = describe_operation_macros(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses)
     return [
         (
             f"{each.before.state.letter} -> {each.after.state.letter}",
@@ -145,19 +145,21 @@ def test_plans_do_not_depend_on_the_frame(name: str) -> None:
     """Turned and shifted on the table, the same macros in the same directions of the parts; also a little askew."""
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
-    straight = understand(scene.assembly, scene.start, scene.nominal_poses)
+    straight = describe_operation_macros(scene.assembly, scene.start, scene.nominal_poses)
     for _ in range(2):
         turn = scenes.turned(scene, pose.at(rng.uniform(-0.3, 0.3, 3) * (1, 1, 0), (0, 0, rng.uniform(-180, 180))))
-        found = understand(turn.assembly, turn.start, turn.nominal_poses)
+        found = describe_operation_macros(turn.assembly, turn.start, turn.nominal_poses)
         askew = scenes.noisy(scene.nominal_poses, rng, 1.0, 1.0)
-        seen = understand(scene.assembly, scene.start, askew, angle_rad=np.radians(10.0))
+        seen = describe_operation_macros(scene.assembly, scene.start, askew, angle_rad=np.radians(10.0))
         for a, b, c in zip(straight, found, seen, strict=True):
             assert a.names == b.names == c.names
             assert a.after.state == b.after.state == c.after.state
             assert b.after.line.travel_m == a.after.line.travel_m
             np.testing.assert_allclose(b.after.line.direction, a.after.line.direction, atol=1e-9)
             for m, n in zip(a.after.macros, b.after.macros, strict=True):
-                np.testing.assert_allclose(b.after.own(n.direction), a.after.own(m.direction), atol=1e-9)
+                np.testing.assert_allclose(
+                    b.after.to_part_frame(n.direction), a.after.to_part_frame(m.direction), atol=1e-9
+                )
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

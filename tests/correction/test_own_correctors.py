@@ -13,7 +13,7 @@ import pytest
 from apo_bench import InputError, Scene, TrialConfig, build_scene, correct, load_scenario
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.trial.run import record_trial
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial_stages import simulate_demonstration
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()

@@ -12,7 +12,7 @@ from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.trial.stages import LAYOUT, Attempt, replay_and_judge, stream
+from apo_bench.trial.trial_stages import LAYOUT, Attempt, replay_and_judge, stream
 
 SEED = 3
 

@@ -23,10 +23,10 @@ VERBS = frozenset(
         """add aim align allow bore bound build carry check choose classify clean collect complete comply compute
     concatenate contrast convert copy correct correlate count decode demonstrate depart descend describe detect draw
     enclose escape evaluate explain extrude factor filter find finish fit flatten floor follow format freeze generate
-    get group import interpolate invert join judge linearise list load make measure merge move name normalise observe
-    open parse place plan pool press print project rank read recede redirect refuse release remember replace replay
-    resolve restore revolve round run save say servo set settle shorten show shrink simplify smooth solve spell spread
-    straighten summarise switch tabulate take tally translate unpack unwhiten use wait wake weld whiten write
+    get group import interpolate intersect invert join judge linearise list load make measure merge move name normalise
+    observe open parse place plan pool press print project rank read recede redirect refuse release remember replace
+    replay resolve restore revolve round run save say servo set settle shorten show shrink simplify smooth solve spell
+    spread straighten summarise switch tabulate take tally translate unpack unwhiten use wait wake weld whiten write
     zero""",
     )
 )

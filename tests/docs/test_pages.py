@@ -150,7 +150,8 @@ def same_output(printed: str, shown: str, within: float = 0.02) -> bool:
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for contact equations, quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners, tracking, tests."""
+    """But for contact equations, quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners,
+    tracking, tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]

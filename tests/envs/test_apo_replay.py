@@ -23,7 +23,7 @@ from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import outcomes
 from apo_bench.simulation.execution import execution as replays
-from apo_bench.trial.stages import SimulatedDemonstration, reobservations_of, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, reobservations_of, simulate_demonstration
 
 SEED = 5
 REPLAY = "apo_bench.envs.robot.replay_and_judge"

@@ -55,7 +55,7 @@ def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:
     estimates.write_text("\n".join([lines[0], *(lines[1 + i] for i in order)]), encoding="utf-8")
     seen = read_results(estimates)
     found = match_residuals(seen, read_truth(truth, seen))
-    assert_array_equal(found.found, made.found)
+    assert_array_equal(found.is_estimated, made.found)
     assert_allclose(found.shift_mm[made.found], made.shift[made.found], atol=1e-4)
     assert_allclose(found.turn_deg[made.found], made.turn[made.found], atol=1e-4)
     assert_allclose(found.trace_deg[made.found], found.angle_deg[made.found], atol=0.02)

@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError, load_scenario
 from apo_bench.formats.kit import FORM_COLUMNS, TAG_EDGE_MM, make_part_mesh, make_plate_mesh, write_kit
 from apo_bench.geometry import Solid
-from apo_bench.importers.cad.importing import raw_solids
+from apo_bench.importers.cad.part_import import raw_solids
 from apo_bench.io import read_csv
 
 CLEARANCE_MM = 0.3

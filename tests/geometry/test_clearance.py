@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.geometry import Face, Hull, Solid, shrink_pieces
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.faces import SIDES, unite
+from apo_bench.scenario.parts.box_union import SIDES, unite
 
 
 @pytest.mark.parametrize("clearance_mm", [0.25])

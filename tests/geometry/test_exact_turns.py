@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Face, Hull, Solid, find_nearest_alike, find_revolution, find_symmetries, make_turn, pose
+from apo_bench.geometry import (
+    Face,
+    Hull,
+    Solid,
+    find_nearest_equivalent_pose,
+    find_revolution,
+    find_symmetries,
+    make_rotation_about_axis,
+    pose,
+)
 from tests.round_contacts import MM, part, ring, tube, wall
 
 
@@ -62,9 +71,9 @@ def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
     expected = np.eye(4)
     T[:3, :3], expected[:3, :3] = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
     axis = find_revolution(solid)
-    found = find_nearest_alike(solid, T, expected)
+    found = find_nearest_equivalent_pose(solid, T, expected)
     every = [
-        T @ g @ make_turn(axis.point, axis.axis, t)
+        T @ g @ make_rotation_about_axis(axis.point, axis.axis, t)
         for g in find_symmetries(solid)
         for t in np.linspace(-np.pi, np.pi, 721)
     ]

@@ -49,7 +49,7 @@ def test_a_shaft_in_a_hole(T: np.ndarray, gap_mm: float, angle_deg: float, lengt
 )
 def test_a_shaft_on_a_plane(T: np.ndarray, heights_mm: tuple[float, float], angle_deg: float, length_mm: float) -> None:
     for found in (measure_mate(PEG, T, TABLE, HERE), measure_mate(TABLE, HERE, PEG, T)):
-        assert 1e3 * found.off[:, 2] == pytest.approx(heights_mm, abs=1e-9)
+        assert 1e3 * found.offsets[:, 2] == pytest.approx(heights_mm, abs=1e-9)
         assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
         assert 1e3 * found.length_m == pytest.approx(length_mm, abs=1e-9)
         assert bool(found.common) == (length_mm > 0)
@@ -105,5 +105,5 @@ def test_the_world_does_not_matter(seed: int, pair: tuple[Face | RoundFace, Face
     there = measure_mate(a, W @ T, b, W)
     for name in ("gap_m", "angle_rad", "rise_m", "length_m"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-9)
-    assert there.off == pytest.approx(here.off @ W[:3, :3].T, abs=1e-9)
+    assert there.offsets == pytest.approx(here.offsets @ W[:3, :3].T, abs=1e-9)
     assert compute_shares([there.common], [here.common]) == pytest.approx([1.0], abs=1e-6)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Solid, find_least_turned, find_revolution, pose
+from apo_bench.geometry import Solid, find_least_rotated_pose, find_revolution, pose
 from tests import rounds
 
 
@@ -19,7 +19,7 @@ def test_the_turn_is_the_least_there_is(seed: int, part: Solid) -> None:
     assert found is not None
     T = pose.exp(rng.standard_normal(6))
     true = pose.exp(rng.standard_normal(6))
-    best = find_least_turned(part, T, true)
+    best = find_least_rotated_pose(part, T, true)
 
     def turn(X: np.ndarray) -> float:
         return float(np.linalg.norm(pose.log(pose.inverse(true) @ X)[3:]))

@@ -13,7 +13,7 @@ from apo_bench.geometry import (
     PosedPieces,
     Solid,
     compute_exit_distance,
-    is_way_free,
+    is_path_free,
     measure_intrusion_depths,
     pose,
 )
@@ -58,18 +58,18 @@ def posed(solid: Solid, T: Array) -> PosedPieces:
 def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
     stick = posed(scenes.stick(), scenes.mm(0, 0, 25))
     cube = posed(scenes.cube(), scenes.mm(0, 0, 25))
-    assert is_way_free([stick], X, 0.5, [cube])
-    assert is_way_free([stick], -X, 0.5, [cube])
-    assert not is_way_free([stick], Z, 0.05, [cube])
-    assert not is_way_free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
+    assert is_path_free([stick], X, 0.5, [cube])
+    assert is_path_free([stick], -X, 0.5, [cube])
+    assert not is_path_free([stick], Z, 0.05, [cube])
+    assert not is_path_free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
     assert compute_exit_distance([stick], X, [cube]) == pytest.approx(0.135, abs=1e-9)
     assert compute_exit_distance([stick], X, []) == 0.0
     second = posed(scenes.cube(), scenes.mm(60, 0, 25))
     assert compute_exit_distance([stick], X, [cube, second]) == pytest.approx(0.195, abs=1e-9)
     assert compute_exit_distance([stick], -X, [cube, second]) == pytest.approx(0.135, abs=1e-9)
     beyond = posed(scenes.block(), scenes.mm(300, 0, 25))
-    assert is_way_free([stick], X, 0.1649, [cube, beyond])
-    assert not is_way_free([stick], X, 0.1652, [cube, beyond])
+    assert is_path_free([stick], X, 0.1649, [cube, beyond])
+    assert not is_path_free([stick], X, 0.1652, [cube, beyond])
 
 
 def test_the_end_of_the_overlap_is_the_same_for_all_kinds_of_pieces() -> None:

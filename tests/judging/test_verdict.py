@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from apo_bench import Criteria, judge
 from apo_bench.assembly import ReachedState, compute_placements
 from apo_bench.geometry import pose
-from apo_bench.judging.finished import fixtures
+from apo_bench.judging.finished_assembly import list_fixtures
 from apo_bench.records import Thresholds
 from tests import scenes
 from tests.end_states import (
@@ -244,7 +244,7 @@ def test_parts_that_touch_are_told_apart_by_what_their_contacts_leave_free() -> 
 
 
 def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:
-    assert fixtures(FIXTURE().assembly) == {"cube"}
+    assert list_fixtures(FIXTURE().assembly) == {"cube"}
     far = [put("cube", 4, scenes.mm(200, -160, 40, (0, 90, 0))), shift("cube", END, 30, 0, 0)]
     assert verdict(FIXTURE(), far).success
     for fields in ({"speed_m_s": 0.01}, {"released": False}, {"penetration_m": 1e-3}):

@@ -11,7 +11,7 @@ from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.sweeps.worker import timing
 from apo_bench.records import RECORD_FIELDS, REQUIRED
 from apo_bench.records.run.validation import TIMING_FIELDS, record_of, timing_of, unwritable
-from apo_bench.trial.endings import record_lost_trial, record_misbehaviour
+from apo_bench.trial.record_start_and_end import record_lost_trial, record_misbehaviour
 
 SPEC = TrialConfig("block_on_block", noise_mm=3.0, noise_deg=2.0, method="paper", seed=2)
 
@@ -58,7 +58,7 @@ def test_what_every_record_has_is_required(made: list[dict[str, Any]]) -> None:
 
 def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     from apo_bench.trial import run
-    from apo_bench.trial.stages import simulate_demonstration
+    from apo_bench.trial.trial_stages import simulate_demonstration
 
     scene = build_scene(load_scenario("block_on_block"))
     shown = simulate_demonstration(scene, SPEC.human_error_scale, SPEC.seed)

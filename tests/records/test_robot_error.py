@@ -20,6 +20,7 @@ from apo_bench.records import (
         ("hand_eye:0", "none"),
         ("tool:0.50+hand_eye:1.0/0", "hand_eye:1+tool:0.5"),
         ("in_hand:0/2+joints:.05", "joints:0.05+in_hand:0/2"),
+        ("ft_drift:2+finger:1+base_tilt:.1+sag:0.7", "sag:0.7+base_tilt:0.1+finger:1+ft_drift:2"),
     ],
 )
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) -> None:
@@ -30,7 +31,10 @@ def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("elbow:1", "unknown kind of robot error 'elbow'. Known: hand_eye, in_hand, joints, none, tool."),
+        (
+            "elbow:1",
+            "unknown kind of robot error 'elbow'. Known: base_tilt, finger, ft_drift, hand_eye, in_hand, joints, none,",
+        ),
         (
             "tool:1/2",
             "the robot error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5.",

@@ -23,8 +23,8 @@ from apo_bench.assembly import Outcome
 from apo_bench.records import KEY, RECORD_SCHEMA
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder, read_records
-from apo_bench.trial.endings import end_record
 from apo_bench.trial.fingerprint import versions
+from apo_bench.trial.record_start_and_end import end_record
 
 GRID = {"scenarios": ["block_on_block"], "noise_level": [1.0], "trials": 60}
 CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}

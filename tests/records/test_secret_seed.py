@@ -23,7 +23,7 @@ from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import SecretSeed, open_secret_seed, read_secret_seed
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.secret_seed import make_secret_seed
-from apo_bench.trial.stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
+from apo_bench.trial.trial_stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 

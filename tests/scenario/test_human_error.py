@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from apo_bench import Layout, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import compute_placements
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import list_scenario_names
 from apo_bench.scenario.human_error import NOTHING_M, compute_human_error_covariance, spread_error
 from apo_bench.scenario.scenario import HumanError
+from apo_bench.scenario.scenario_file import list_scenario_names
 from tests import rounds
 from tests.scenes import Scene
 

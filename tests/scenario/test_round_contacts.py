@@ -11,8 +11,8 @@ import pytest
 from apo_bench import InputError
 from apo_bench.assembly import Contact, Gap, PartFace
 from apo_bench.io import convert_typed
-from apo_bench.scenario.checks import check_layouts
 from apo_bench.scenario.contacts import ContactGaps, read_contacts
+from apo_bench.scenario.layout_checks import check_layouts
 from apo_bench.scenario.play import check_clearance
 from apo_bench.scenario.scenario import Shift, Site
 from apo_bench.scenario.tables import OperationTable

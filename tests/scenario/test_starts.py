@@ -6,9 +6,9 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import list_scenario_names
 from apo_bench.scenario.layout import place_layout
-from apo_bench.scenario.order import AIR_M, find_part_in_the_air
+from apo_bench.scenario.operation_order import AIR_M, find_part_in_the_air
+from apo_bench.scenario.scenario_file import list_scenario_names
 
 
 @pytest.mark.parametrize("name", list_scenario_names())

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Arm, InputError, TrialConfig, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.records.own_code import own_code
+from apo_bench.records.user_code import own_code
 from apo_bench.resources import folder
 from apo_bench.simulation.arm_checks.arm_check import check_arm
 from apo_bench.simulation.arms import finding

@@ -13,7 +13,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import smooth_trajectory, translate
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, simulate_demonstration
 
 CLEARANCE_MM = 0.25
 LEVEL_MM = 0.01

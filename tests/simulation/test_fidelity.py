@@ -13,7 +13,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.robot import obstacles
 from apo_bench.simulation.robot.paths import Trajectory, translate
 from apo_bench.simulation.scene.world import make_initial_state
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial_stages import simulate_demonstration
 
 
 @cache

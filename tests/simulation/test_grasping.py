@@ -12,7 +12,9 @@ from apo_bench.scenario.layout import place_layout
 from apo_bench.scenario.parts.making import Body, extrude, make_polygon, make_rectangle
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, half_width, list_obstacles
+from apo_bench.simulation.execution.grasp_clearance import RestingPart, list_obstacles
+from apo_bench.simulation.execution.grasp_frame import half_width
+from apo_bench.simulation.execution.grasping import grasp_at
 from apo_bench.simulation.execution.prepare import Move, plan_moves
 from apo_bench.simulation.execution.transfer import is_tilted
 from apo_bench.simulation.robot.gripper import list_gripper_boxes

@@ -10,7 +10,7 @@ from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.scenario.attach_lines import list_nominal_operations
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.trial.stages import Attempt, replay_and_judge
+from apo_bench.trial.trial_stages import Attempt, replay_and_judge
 
 CUBE = (Path(__file__).parents[2] / "assets" / "parts" / "cube.xml").read_text(encoding="utf-8")
 BOTTOM = '<geom name="end" pos="0.0225 0 0" size="0.0025 0.01 0.01"/><site name="bottom" pos="0.02 0 0"/>'

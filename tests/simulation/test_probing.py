@@ -10,13 +10,14 @@ from apo_bench.geometry import pose
 from apo_bench.records import parse_ft_noise
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.probing.places import floor_places
-from apo_bench.simulation.execution.probing.state import ProbingState, touch_guard
+from apo_bench.simulation.execution.probing.state import PADS, ProbingState, touch_guard
 from apo_bench.simulation.execution.probing.touching import probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.sag import compute_sag_per_metre
 from apo_bench.simulation.robot.wrist import compute_low_pass_gain, filter_noise
 from apo_bench.trial.run import probing_config
-from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
+from apo_bench.trial.trial_stages import replay_and_judge, robot_error_of, simulate_demonstration
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 
@@ -46,6 +47,7 @@ def found_out(name, error, parts_at=None, stated=STATED):
         probing_config(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error
     )
     robot.wait(0.05)
+    robot.level()
     probe_fixed_parts(robot, probing)
     return probing.estimate
 
@@ -97,6 +99,39 @@ def test_the_estimate_depends_on_touches_only():
     for a, b in zip(one.touches, other.touches, strict=True):
         assert np.abs(a.T_world_tip - b.T_world_tip).max() < 2e-5
     assert one.mean == pytest.approx(other.mean, abs=3e-5)
+
+
+def test_an_arm_that_hangs_lower_than_its_command_rests_on_nothing():
+    """Half of its weight is not compensated: its encoders show that, and it carries its weight after a touch, too."""
+    model = scene("stick_in_tower").work.model
+    usual = model.body_gravcomp.copy()
+    model.body_gravcomp[:] = 0.5 * usual
+    try:
+        found = found_out("stick_in_tower", None)
+    finally:
+        model.body_gravcomp[:] = usual
+    assert len(found.touches) == 3
+    assert found.mean == pytest.approx(0.0, abs=3e-5)
+
+
+def test_a_drifting_sensor_is_tared_before_each_touch():
+    error = drawn("stick_in_tower", "ft_drift:20")
+    assert np.linalg.norm(error.ft_drift[:3]) > 0.2  # 2 N in 10 s
+    found = found_out("stick_in_tower", error)
+    assert len(found.touches) == 3
+    assert found.mean == pytest.approx(0.0, abs=3e-5)
+
+
+def test_a_stated_sag_is_felt_on_the_floor():
+    error = drawn("stick_in_tower", "sag:1")
+    found = found_out("stick_in_tower", error, stated="sag:1")
+    assert found.sag * compute_sag_per_metre(scene("stick_in_tower")) == pytest.approx(error.sag, rel=0.05)
+
+
+def test_pads_of_unequal_fingers_are_felt_around_a_fixed_part():
+    error = drawn("peg_in_hole", "finger:1")
+    found = found_out("peg_in_hole", error, stated="finger:1")
+    assert found.held(PADS, np.eye(4))[0, 3] == pytest.approx(error.finger / 2, abs=3e-5)
 
 
 def test_probing_succeeds_where_a_blind_robot_fails():

@@ -10,7 +10,7 @@ from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.search import RADIUS_M
 from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
+from apo_bench.trial.trial_stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -17,7 +17,7 @@ from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene import settling
 from apo_bench.simulation.scene.settling import settle
 from apo_bench.trial.run import noise_of, run_trial
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     SimulatedDemonstration,
     demonstration_failure,
     observe_demonstration,

@@ -12,7 +12,7 @@ from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.analysis import tabulate_detection
 from apo_bench.cli import app as cli
 from apo_bench.records import DETECTED
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, simulate_demonstration
 from tests.benchmark.analysis.test_rates import UNCOUNTED
 
 SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial_stages import simulate_demonstration
 
 
 @pytest.fixture(scope="module")

@@ -25,11 +25,11 @@ from apo_bench import (
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.planning.prediction.failure import Prediction, predict
+from apo_bench.planning.prediction.first_failure import Prediction, predict_failure
 from apo_bench.simulation.execution.prepare import in_reach
-from apo_bench.trial.fitting import FittingPlan
+from apo_bench.trial.plan_fitting import FittingPlan
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import observe_demonstration, simulate_demonstration
 
 plain = ContactCorrector()
 SEVERAL_MM = 20.0
@@ -48,7 +48,7 @@ def seen_at(name: str, seed: int, noise_level: float = 8.0) -> Observation:
 
 
 def foretold(plan: Plan, scene: Scene) -> Prediction:
-    return predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
+    return predict_failure(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
 
 
 @cache

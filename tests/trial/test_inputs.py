@@ -14,7 +14,7 @@ import trimesh
 
 import apo_bench
 from apo_bench.resources import folder
-from apo_bench.trial.inputs import module_files
+from apo_bench.trial.input_files import module_files
 
 AUDITED = """
 import json, os, sys
@@ -41,9 +41,9 @@ def add_and_note(spec, body, picture):
 
 part_file.add_picture = add_and_note
 from apo_bench import TrialConfig
-from apo_bench.trial import inputs
+from apo_bench.trial import input_files
 from apo_bench.trial.fingerprint import config_hash, content_hash
-from apo_bench.trial.stages import scene_of
+from apo_bench.trial.trial_stages import scene_of
 from apo_bench.trial.run import run_trial
 
 read = mujoco.MjSpec.from_file
@@ -74,7 +74,7 @@ files = sorted(
 )
 
 def identity():
-    inputs._module_digest.cache_clear()
+    input_files._module_digest.cache_clear()
     return config_hash(settings, content_hash(scene.scenario, settings.scenario, scene.arm.files))
 
 before = identity()

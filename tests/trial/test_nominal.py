@@ -10,7 +10,7 @@ import pytest
 from apo_bench import Observation, Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import place_layout
-from apo_bench.trial.nominal import fit_nominal_poses
+from apo_bench.trial.nominal_poses import fit_nominal_poses
 from apo_bench.trial.planning import apply_method
 
 SCENARIO = load_scenario("stick_in_tower")

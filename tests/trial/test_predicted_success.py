@@ -12,7 +12,7 @@ from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.assembly import Hypothesis
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
-from apo_bench.planning.prediction.measures import drawn_measures
+from apo_bench.planning.prediction.plan_measures import measure_drawn_plans
 from apo_bench.records import TrialRecord
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
@@ -21,7 +21,7 @@ from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import predict_success
 from apo_bench.trial.robot_draws import brought, stack_errors
 from apo_bench.trial.run import noise_of
-from apo_bench.trial.stages import (
+from apo_bench.trial.trial_stages import (
     SimulatedDemonstration,
     draw_robot_error,
     observe_demonstration,
@@ -118,7 +118,7 @@ def test_several_robots_at_once_bring_parts_where_each_does(scene: Scene, simula
     limits = scene.scenario.thresholds
     sizes = {
         (each.operation, each.kind): each.size
-        for each in drawn_measures(plan, scene.clearance_mm, limits, scene.scenario.attach, (), together)
+        for each in measure_drawn_plans(plan, scene.clearance_mm, limits, scene.scenario.attach, (), together)
     }
     for i, error in enumerate(errors):
         alone = brought(plan, scene, error)
@@ -126,7 +126,7 @@ def test_several_robots_at_once_bring_parts_where_each_does(scene: Scene, simula
             for part, T in each.items():
                 at = every[part][i] if every[part].ndim == 3 else every[part]
                 np.testing.assert_allclose(at, T, rtol=0, atol=1e-12)
-        for one in drawn_measures(plan, scene.clearance_mm, limits, scene.scenario.attach, (), alone):
+        for one in measure_drawn_plans(plan, scene.clearance_mm, limits, scene.scenario.attach, (), alone):
             assert one.size.shape == (1,)
             if one.kind in ("fit", "side"):
                 assert sizes[one.operation, one.kind][i] == pytest.approx(one.size[0], abs=1e-9)

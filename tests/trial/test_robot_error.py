@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.records import TrialRecord
-from apo_bench.trial.stages import draw_robot_error
+from apo_bench.trial.trial_stages import draw_robot_error
 
 SEED = 3
 
@@ -47,7 +47,7 @@ def test_errors_are_in_proportion_and_each_has_its_own_chance(scene: Scene) -> N
 
 def test_a_plan_is_the_same_whatever_is_wrong_with_the_robot_and_ends_elsewhere(scene: Scene) -> None:
     right = row(scene, "none")
-    for wrong in ("hand_eye:1/0.2", "tool:1", "joints:0.1", "in_hand:0.5/1"):
+    for wrong in ("hand_eye:1/0.2", "tool:1", "joints:0.1", "in_hand:0.5/1", "sag:1", "base_tilt:0.2", "finger:2"):
         found = row(scene, wrong)
         for column in ("failure_prediction", "gap_before_mm", "gap_after_mm", "chi_square", "corrected_operations"):
             assert found.get(column) == right.get(column)

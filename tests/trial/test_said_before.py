@@ -13,7 +13,7 @@ from apo_bench.geometry import Array
 from apo_bench.records import WITHOUT_CORRECTOR, parse_method
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial import run
-from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
+from apo_bench.trial.trial_stages import observe_demonstration, scene_of, simulate_demonstration
 
 MISSED = TrialConfig(
     "peg_in_hole",

@@ -21,7 +21,7 @@ from scipy.stats import binom
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.records import TrialRecord
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, simulate_demonstration
 
 RECORD = Path(__file__).with_name("success_rate.json")
 SEEDS = range(10)

@@ -27,7 +27,7 @@ from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.run import run_measured
-from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 
 SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 

@@ -19,9 +19,9 @@ from apo_bench.simulation.film.shapes import shapes_of, surface
 from apo_bench.simulation.film.track import read_part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import make_initial_state
-from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
-from apo_bench.viz.stepping import FACES, Cursor
-from apo_bench.viz.trial_again import repeat_trial
+from apo_bench.trial.rollout import AS_CORRECTED, AS_OBSERVED, AS_TRUE, Rollout, scenario_story
+from apo_bench.viz.repeat_trial import repeat_trial
+from apo_bench.viz.rollout_cursor import FACES, Cursor
 
 
 def with_target_poses(scene: Scene) -> Rollout:
@@ -30,7 +30,7 @@ def with_target_poses(scene: Scene) -> Rollout:
     true = scene.scenario.nominal_poses
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
-    return Rollout(scene, rollout.segments, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
+    return Rollout(scene, rollout.segments, rollout.assembled, {AS_OBSERVED: aside, AS_TRUE: true})
 
 
 def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> None:
@@ -158,7 +158,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
     assert {name: again[name] for name in ("success", "worst_gap_mm")} == {
         name: row[name] for name in ("success", "worst_gap_mm")
     }
-    assert set(rollout.poses) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
+    assert set(rollout.poses) == {AS_OBSERVED, AS_CORRECTED, AS_TRUE}
     reached = read_part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():
@@ -169,8 +169,8 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
 def test_where_nothing_can_be_shown_one_sentence_says_so(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("apo_bench.viz.viewing.no_window", lambda: "no window can be opened here (none)")
-    monkeypatch.setattr("apo_bench.viz.viewing.no_browser", lambda: "viser is not installed")
+    monkeypatch.setattr("apo_bench.viz.choose_viewer.no_window", lambda: "no window can be opened here (none)")
+    monkeypatch.setattr("apo_bench.viz.choose_viewer.no_browser", lambda: "viser is not installed")
     said = {
         ("view", "stick_in_tower"): "no window can be opened here (none), and for a browser viser is not installed",
         ("view", "stick_in_tower", "--port", "8090"): "--port 8090 needs a browser, but viser is not",

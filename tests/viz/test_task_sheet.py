@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import load_scenario
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.scenario_file import list_scenario_names
 from apo_bench.viz.task_sheet import task_sheet
 from docs.task_sheets import page
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from apo_bench.assembly import Outcome
-from apo_bench.trial.endings import end_record
+from apo_bench.trial.record_start_and_end import end_record
 from apo_bench.viz.trial_text import summary_lines
 from tests.benchmark.analysis.test_rates import row
 

@@ -15,7 +15,12 @@ from apo_bench.benchmark.analysis.detection import tabulate_detection
 from apo_bench.benchmark.analysis.effort import tabulate_effort
 from apo_bench.benchmark.analysis.gaps import tabulate_gaps
 from apo_bench.benchmark.analysis.half_level import HalfLevel
-from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.number_text import (
+    format_percent,
+    format_percent_interval,
+    format_points,
+    format_signed,
+)
 from apo_bench.benchmark.analysis.over_seeds import (
     FEWEST_SEEDS,
     Contrast,
@@ -46,8 +51,8 @@ from apo_bench.benchmark.analysis.settings import (
     list_settings,
 )
 from apo_bench.benchmark.analysis.summary import Summary, summarise
+from apo_bench.benchmark.analysis.table_line import ALL, Line
 from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
-from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
 
 __all__ = (
     "ALL",

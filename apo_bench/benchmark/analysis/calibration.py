@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import rank_contact_source, rank_method
-from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
+from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.records import knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
 

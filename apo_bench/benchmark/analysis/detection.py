@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.line import ALL, Line
 from apo_bench.benchmark.analysis.rates import Rate, Records
+from apo_bench.benchmark.analysis.table_line import ALL, Line
 from apo_bench.records import DETECTED
 from apo_bench.records.run.trials import Trials, trials_of
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import by_method
-from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Records
+from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.records.run.trials import trials_of
 
 

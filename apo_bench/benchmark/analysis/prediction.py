@@ -3,8 +3,8 @@
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import by_method
-from apo_bench.benchmark.analysis.line import ALL, Line
 from apo_bench.benchmark.analysis.rates import Rate, Records, was_executed
+from apo_bench.benchmark.analysis.table_line import ALL, Line
 from apo_bench.records.run.trials import Trials, trials_of
 
 

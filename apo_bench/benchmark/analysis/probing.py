@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
-from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Records, root_mean_square
+from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.records import parse_assumed_error, parse_robot_error
 from apo_bench.records.run.trials import Trials, trials_of
 

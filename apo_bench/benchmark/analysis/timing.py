@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import rank_method
-from apo_bench.benchmark.analysis.line import Line
+from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.io import group_by, read_lines
 from apo_bench.records.run.validation import timing_of
 

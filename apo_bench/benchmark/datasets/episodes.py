@@ -15,7 +15,7 @@ from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.simulation.hooks import Hooks, Phase
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene, get_part_pose, switch_wrist_sensors_on
 from apo_bench.trial.run import noise_of, run_trial
-from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
+from apo_bench.trial.trial_stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 
 _OF_ROW = MappingProxyType(  # columns of a trial record that the table of episodes has -> meaning
     {

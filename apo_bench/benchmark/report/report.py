@@ -20,10 +20,10 @@ from apo_bench.benchmark.analysis import (
     tabulate_trial_times,
     tabulate_work,
 )
-from apo_bench.benchmark.report.answer import answer
+from apo_bench.benchmark.report.conclusions import answer
+from apo_bench.benchmark.report.failure_choice import Draw, sample
 from apo_bench.benchmark.report.figures.figures import figures
 from apo_bench.benchmark.report.page.report_page import Contents, report_page
-from apo_bench.benchmark.report.pictures import Draw, sample
 from apo_bench.benchmark.report.tables.conditions import condition_table, half_table, pair_table
 from apo_bench.benchmark.report.tables.methods import (
     calibration_table,

@@ -19,13 +19,13 @@ from typing import Any
 from pebble import ProcessExpired, ProcessPool
 
 from apo_bench.benchmark.sweeps.grid import Batch
-from apo_bench.benchmark.sweeps.stopping import stop_at_signals
+from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, set_environment
 from apo_bench.names import add_own_modules, folder_of_own_modules
 from apo_bench.records import TrialRecord
-from apo_bench.trial.endings import record_lost_trial
+from apo_bench.trial.record_start_and_end import record_lost_trial
 from apo_bench.trial.request import Request, checked_request, record_lost_request, run_request
 
 Emit = Callable[[TrialRecord, Timing], None]

@@ -9,7 +9,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, describe_grids, load_all, units
 from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
 from apo_bench.benchmark.sweeps.progress import progress
-from apo_bench.benchmark.sweeps.stopping import stop_at_signals
+from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
 from apo_bench.correction.correctors import resolve_corrector
 from apo_bench.errors import require, require_known
@@ -34,7 +34,7 @@ from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
 from apo_bench.trial.fingerprint import config_hash, content_hash, git_revision, versions
-from apo_bench.trial.inputs import content_pieces, noise_content, own_content
+from apo_bench.trial.input_files import content_pieces, noise_content, own_content
 
 _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
@@ -133,7 +133,7 @@ def run_sweep(
                 run_locally(batches, inputs, workers or 1, limit_s, emit)
             else:
                 from apo_bench.benchmark.sweeps.cluster import run_on_cluster
-                from apo_bench.benchmark.sweeps.travelling import travelling_files
+                from apo_bench.benchmark.sweeps.user_files import travelling_files
 
                 names = (*_names(grids, "method"), *_names(grids, "noise"), *_names(grids, "contact_source"), arm_name)
                 files = travelling_files(loaded, arm.files, names)

@@ -13,7 +13,7 @@ from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, versions
 from apo_bench.trial.run import record_trial
-from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
+from apo_bench.trial.trial_stages import demonstration_of, scene_key, scene_of
 
 Timing = dict[str, Any]
 """A line of `timing.jsonl`: wall times, host and worker, which settings and seed do not determine."""

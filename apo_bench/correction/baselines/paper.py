@@ -20,7 +20,7 @@ def paper(observation: Observation) -> Correction:
     system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
-    solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)
+    solution = solve_newton(system.among(system.contacts_with(freed)), observation.poses, freed)
     status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)), observation.gap_m)
     poses = solution.poses
     if status == "converged":

@@ -118,7 +118,7 @@ def _trial(
     Returns:
         The solution, and the largest |e| of these equations and of contacts that had failed, [m].
     """
-    chosen = system.containing(free)
+    chosen = system.contacts_with(free)
     solution = solve_newton(system.among(chosen), poses, free)
     return solution, find_largest_residual(system.gaps(solution.poses)[chosen | failing])
 

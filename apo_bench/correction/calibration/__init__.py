@@ -4,7 +4,7 @@ A touch is a contact equation for the robot instead of a pose: a point of the ha
 plane. `make_prior_estimate` starts from the stated errors of the robot; `RobotEstimate.touch` updates it by touches.
 """
 
-from apo_bench.assembly.touch import Touch
+from apo_bench.assembly.probing_touch import Touch
 from apo_bench.correction.calibration.robot_estimate import (
     UNKNOWN,
     RobotEstimate,

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import ProbingResult
-from apo_bench.assembly.touch import Touch, checked_pose
+from apo_bench.assembly.probing_touch import Touch, checked_pose
 from apo_bench.correction.calibration.robot_model import (
     HAND_EYE,
     TOOL,
@@ -24,7 +24,9 @@ from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, copy_frozen, freeze, make_copyable, pose
 from apo_bench.records.robot_error import Sigmas
 
-UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
+UNKNOWN = Sigmas(
+    hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0), sag_mm=0.5, base_tilt_deg=0.1, finger_mm=0.5
+)
 """Standard deviations for a robot whose errors are not stated, [mm, deg]. A published automatic calibration of hand and
 eye ends at 0.93 mm and 0.27 degrees (arXiv 2311.01335)."""
 
@@ -38,7 +40,7 @@ class RobotEstimate:
     middle: Array
     """(3,), [m], world frame: the centre of the rotation between hand and eye."""
     joints: int
-    """Number of joints of the arm."""
+    """Number of columns of a Jacobian: the joints of the arm, and its sag if that is stated."""
     grasps: tuple[int | None, ...]
     """The number of each grasp in order; None for a grasp that is over since another one has its number."""
     sigmas: Array
@@ -52,6 +54,8 @@ class RobotEstimate:
     """All touches so far, each with the index of its grasp."""
     taken: tuple[bool, ...] = ()
     """Which of the touches are used."""
+    sags: bool = False
+    """Whether the last column of a Jacobian is the displacement of the tip by a sag of 1 m, as a body twist."""
 
     def __post_init__(self) -> None:
         u = len(self.sigmas)
@@ -69,8 +73,13 @@ class RobotEstimate:
 
     @property
     def encoders(self) -> Array:
-        """The estimated offset of each joint from its encoder, (joints,), [rad]."""
-        return self.mean[joints_in(self.joints)]
+        """The estimated offset of each joint from its encoder, (joints,), [rad], without the sag."""
+        return self.mean[joints_in(self.joints)][: self.joints - self.sags]
+
+    @property
+    def sag(self) -> float:
+        """The estimated height that the tip loses by the weight of the arm, [m]; 0 if no sag is stated."""
+        return float(self.mean[joints_in(self.joints)][-1]) if self.sags else 0.0
 
     @property
     def touches(self) -> tuple[Touch, ...]:
@@ -197,22 +206,35 @@ class RobotEstimate:
 
 
 @check_arguments
-def make_prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
+def make_prior_estimate(
+    sigmas: Sigmas, joints: int, middle: ArrayLike, base: ArrayLike | None = None, sags: bool = False
+) -> RobotEstimate:
     """The estimate before any touch: all errors 0, with the stated standard deviations.
 
     Args:
         sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where they are not stated.
         joints: Number of joints of the arm.
         middle: (3,), [m], world frame: the mean of the poses.
+        base: (3,), [m], world frame: the foot of the robot, about which it tilts; None leaves the tilt out.
+        sags: Whether Jacobians of touches have a further column, the displacement of the tip by a sag of 1 m.
     """
     require(joints >= 0, f"{joints} joints were given; give the number of joints of the arm.")
     mm, deg = sigmas.hand_eye
     prior = np.zeros(joints_in(joints).stop)
     prior[HAND_EYE] = np.repeat([1e-3 * mm, np.radians(deg)], 3)
+    center = copy_frozen(middle, 3)
+    if base is not None and sigmas.base_tilt_deg:
+        # Turns about the level axes move the middle by w x arm. The estimate takes shift and turn as independent.
+        x, y, z = center - copy_frozen(base, 3)
+        tilt = np.radians(sigmas.base_tilt_deg)
+        prior[HAND_EYE] = np.hypot(prior[HAND_EYE], tilt * np.array([z, z, np.hypot(x, y), 1.0, 1.0, 0.0]))
     prior[TOOL] = 1e-3 * sigmas.tool_mm
     prior[joints_in(joints)] = np.radians(sigmas.joints_deg)
+    if sags:
+        prior = np.append(prior, 1e-3 * sigmas.sag_mm)
     checked = _checked_sigmas(prior, len(prior))
-    return RobotEstimate(copy_frozen(middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2))
+    mean = np.zeros(len(checked))
+    return RobotEstimate(center, joints + sags, (), checked, mean, np.diag(checked**2), sags=sags)
 
 
 def compute_slip_sigmas(sigmas: Sigmas) -> Array:

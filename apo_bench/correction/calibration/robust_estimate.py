@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.touch import Touch
+from apo_bench.assembly.probing_touch import Touch
 from apo_bench.correction.calibration.robot_model import Places, compute_part_poses
 from apo_bench.geometry import Array, pose
 

@@ -10,7 +10,7 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from apo_bench.assembly import Assembly, find_contact_pattern
+from apo_bench.assembly import Assembly, find_equation_pattern
 from apo_bench.correction.solvers import SMALLEST, count_plays
 from apo_bench.geometry import Array, copy_frozen, remember
 
@@ -31,7 +31,7 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     A row stands for all v vertices of its contact, so its deviation is sqrt(v) times that of one vertex.
     """
     count, unit_m = count_plays(assembly, play_m)
-    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(find_contact_pattern(assembly).begin))
+    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(find_equation_pattern(assembly).begin))
     return copy_frozen(np.repeat(each, 3))
 
 

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Observation, classify_contact, evaluate_odl, find_contact_pattern
+from apo_bench.assembly import Assembly, Contact, Observation, classify_contact, evaluate_odl, find_equation_pattern
 from apo_bench.geometry import Array, list_quarter_turns, pose, remember
 
 _APART = 0.1
@@ -155,7 +155,7 @@ def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Co
     stack = np.concatenate([start, poses])
     conditions = list[_Condition]()
     others = {p + other for other in left if other != k}
-    for word, ends in zip(find_contact_pattern(assembly).words, contact_ends(assembly), strict=True):
+    for word, ends in zip(find_equation_pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
         if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue

@@ -9,7 +9,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Observation, build_contact_equations, find_contact_pattern
+from apo_bench.assembly import Assembly, Observation, build_contact_equations, find_equation_pattern
 from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
     LARGEST_DENSE,
@@ -196,7 +196,7 @@ def _demands(assembly: Assembly, play_m: float) -> _Demands:
     """The demands on the contacts of an assembly whose parts fit with this play, [m]."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
-    plane = np.array(find_contact_pattern(assembly).plane)
+    plane = np.array(find_equation_pattern(assembly).plane)
     plane[:, 3] -= np.where(exact, low, 0.0)
     slack_m = fit_deviation(assembly, play_m)
     return _Demands(

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly import find_contact_pattern, find_faces_away, find_largest_residual
+from apo_bench.assembly import find_equation_pattern, find_faces_away, find_largest_residual
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
@@ -117,7 +117,7 @@ def _find_doubtful(problem: Problem, first: Solved) -> Collection[int]:
         return range(n)
     bad = find_faces_away(observation.assembly, observation.start, first.poses)
     bad |= ~(first.gaps <= observation.gap_m)
-    letters = find_contact_pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
+    letters = find_equation_pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
     turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.poses[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())

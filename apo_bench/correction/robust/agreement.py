@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Observation, find_contact_pattern
+from apo_bench.assembly import Observation, find_equation_pattern
 from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
@@ -69,7 +69,7 @@ class ContactAgreement:
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
-        letters = find_contact_pattern(seen.assembly).letters - len(seen.assembly.solids)
+        letters = find_equation_pattern(seen.assembly).letters - len(seen.assembly.solids)
         c = len(system)
         self._uses = (letters[..., None] == np.arange(len(seen.poses))).any(axis=1)
         # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.

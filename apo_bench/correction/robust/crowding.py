@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, compute_placements, measure_round
+from apo_bench.assembly import Observation, compute_placements, measure_round_pair
 from apo_bench.correction.solvers import settle_basis
 from apo_bench.geometry import Array, Face, RoundFace, compute_overlap_area, measure_face_area, measure_intrusion, pose
 
@@ -75,7 +75,7 @@ def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -
     """The fraction of the smaller of two faces in contact that is covered, 0 to 1; of the length, for round faces."""
     if isinstance(a, Face) and isinstance(b, Face):
         return compute_overlap_area(a, T_a, b, T_b) / min(measure_face_area(a), measure_face_area(b))
-    return measure_round(a, T_a, b, T_b).share
+    return measure_round_pair(a, T_a, b, T_b).share
 
 
 def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:

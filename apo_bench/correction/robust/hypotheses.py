@@ -21,7 +21,7 @@ from apo_bench.assembly import (
     Observation,
     OutlierModel,
     SharedError,
-    find_contact_pattern,
+    find_equation_pattern,
     find_faces_away,
 )
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, ROUNDING, fit_deviation, p_value
@@ -295,7 +295,7 @@ def soften(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[
     if not dropped:
         return np.zeros(len(soft), dtype=np.bool_), soft
     wrong = np.repeat(~observation.assembly.without(dropped), 3)
-    each = np.repeat(np.sqrt(np.diff(find_contact_pattern(observation.assembly).begin)), 3) * _WRONG_M
+    each = np.repeat(np.sqrt(np.diff(find_equation_pattern(observation.assembly).begin)), 3) * _WRONG_M
     return wrong, np.where(wrong, each, soft)
 
 
@@ -377,7 +377,7 @@ def _displace(observation: Observation, operations: tuple[int, ...]) -> Observat
     P[:3, 3] = observation.poses[list(operations), :3, 3].mean(axis=0)
     error = SharedError("view", operations, VIEW, P)
     covariance = np.array(observation.covariance)
-    covariance[list(operations)] += error.added(observation.poses)
+    covariance[list(operations)] += error.covariances(observation.poses)
     return replace(observation, covariance=covariance, shared=(*observation.shared, error))
 
 

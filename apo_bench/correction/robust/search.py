@@ -14,7 +14,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, find_contact_pattern
+from apo_bench.assembly import Observation, find_equation_pattern
 from apo_bench.correction.contact.suspects import contacts_of
 from apo_bench.correction.robust.agreement import ContactAgreement, expected_badness
 from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
@@ -297,7 +297,7 @@ class Search:
         """
         assembly = self._case.observation.assembly
         rest = ContactAgreement(self._case, states)
-        letters = find_contact_pattern(assembly).letters - len(assembly.solids)
+        letters = find_equation_pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
             # What agrees without one contact agrees without the whole relation, but for the share of false alarms.
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:

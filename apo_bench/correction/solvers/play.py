@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, PartFace, find_contact_pattern
+from apo_bench.assembly import Assembly, Contact, PartFace, find_equation_pattern
 from apo_bench.geometry import Array, copy_frozen, remember
 
 LARGEST_CORRELATED = 300
@@ -64,7 +64,7 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     for row, shifts_of_contact in zip(by, shifts, strict=True):
         for shift, n in shifts_of_contact.items():
             row[every[shift] : every[shift] + 3] = n
-    each = unit_m**2 / 3.0 * np.diff(find_contact_pattern(assembly).begin)
+    each = unit_m**2 / 3.0 * np.diff(find_equation_pattern(assembly).begin)
     by *= np.sqrt(each)[:, None]
     # A uniform displacement of half width u has variance u^2 / 3; rows that a displacement has a part in go together.
     S = np.diag(np.repeat(count * each, 3))

@@ -6,7 +6,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Pattern, find_contact_pattern
+from apo_bench.assembly import Assembly, EquationPattern, find_equation_pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
 from apo_bench.correction.solvers.word_products import Words, words_of
 from apo_bench.geometry import Array, pose, remember
@@ -26,7 +26,7 @@ class ProjectedContacts:
     """(*, m, 4), frame of the environment part, [m]."""
     forms: Array
     """(*, c, 4): as of `CompactEquations.forms`, at these poses."""
-    pattern: Pattern
+    pattern: EquationPattern
 
     def only(self, some: slice) -> "ProjectedContacts":
         """The equations of some of the observations."""
@@ -68,7 +68,7 @@ def project_vertices(assembly: Assembly, start: Array, plane: Array, poses: Arra
 class _Corners(NamedTuple):
     """The pose-independent part of the projected contacts of an assembly."""
 
-    pattern: Pattern
+    pattern: EquationPattern
     words: Words
     laid: NDArray[np.bool_]
     """(c, 1, 1): whether the vertices are those of the manipulated face."""
@@ -83,7 +83,7 @@ class _Corners(NamedTuple):
 @remember
 def _corners(assembly: Assembly) -> _Corners:
     """Compute the pose-independent part of an assembly's contacts."""
-    known = find_contact_pattern(assembly)
+    known = find_equation_pattern(assembly)
     normal = np.array(known.onto)
     normal[:, 3] = 0.0
     return _Corners(

@@ -9,12 +9,12 @@ from dataclasses import replace
 from itertools import combinations
 
 from apo_bench.assembly import Contact, PartFace, classify_contact, compute_geometric_play
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.errors import InputError
 from apo_bench.geometry import shrink_pieces
-from apo_bench.importers.assembly.posed import PosedPart
-from apo_bench.importers.assembly.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
-from apo_bench.scenario.parts.fit import with_fit
+from apo_bench.importers.assembly.contact_search import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.importers.assembly.posed_parts import PosedPart
+from apo_bench.scenario.parts.fit_faces import with_fit
 
 MOST_OVERLAP_MM = 0.2
 """Faces with a larger overlap do not recede: they are a press fit or a thread."""
@@ -61,7 +61,9 @@ def add_clearance(
 
 def _tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
     """Return the faces of `own` that need play against `other` -> the depth of their overlap, [mm], 0 if none."""
-    pairs = facing(own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE)
+    pairs = find_facing_pairs(
+        own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE
+    )
     gaps = {Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m for each in pairs}
     gaps = {contact: gap_m for contact, gap_m in gaps.items() if gap_m < NEAR_M}  # touching or overlapping
     solids = {own.name: own.solid, other.name: other.solid}

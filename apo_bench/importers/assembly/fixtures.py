@@ -6,9 +6,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from apo_bench.geometry import Array, Box, Solid, collect_corners, measure_intrusion_depths, measure_passage
+from apo_bench.geometry import Array, Box, Solid, collect_corners, intersect_rays, measure_intrusion_depths
 from apo_bench.importers.assembly.staging import is_carried
-from apo_bench.scenario.parts.allowed import THINNEST_M
+from apo_bench.scenario.parts.limits import THINNEST_M
 
 FLOOR_M = 0.002
 """Height of the part's lowest point above the table."""
@@ -90,7 +90,7 @@ def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple
     """
     sides = [np.linspace(a + _INSET_M, b - _INSET_M, _RAYS) for a, b in zip(begin, end, strict=True)]
     grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_RAYS**2)], axis=1)
-    return min(float(measure_passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
+    return min(float(intersect_rays(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
 
 
 def _fit_height(box: Box, solid: Solid, T: Array) -> Box:

@@ -10,9 +10,9 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.cad.assembled import coming_near
-from apo_bench.importers.cad.importing import import_solid, raw_solids
-from apo_bench.importers.cad.places import named_places, write_places
+from apo_bench.importers.cad.near_points import coming_near
+from apo_bench.importers.cad.part_import import import_solid, raw_solids
+from apo_bench.importers.cad.pose_file import named_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
 _UPRIGHT = 1.0 - 1e-9  # cosine between axis and z of an upright round face

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from apo_bench.errors import require
 from apo_bench.importers.assembly.new_scenario import NewScenario
-from apo_bench.importers.assembly.posed import UPS, read_posed
-from apo_bench.importers.assembly.upright import new_upright_scenario
-from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.importers.assembly.posed_parts import UPS, read_posed
+from apo_bench.importers.assembly.scenario_writer import write_scenario
+from apo_bench.importers.assembly.up_axis import new_upright_scenario
 
 
 def scenario_from_poses(

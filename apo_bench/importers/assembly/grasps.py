@@ -8,9 +8,9 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, PadPlace, Solid, find_holds, pose
-from apo_bench.importers.assembly.ordering import Placing
-from apo_bench.importers.assembly.posed import TABLE
-from apo_bench.planning.insertion.arrival import arrive
+from apo_bench.importers.assembly.order_search import Placing
+from apo_bench.importers.assembly.posed_parts import TABLE
+from apo_bench.planning.insertion.arrival import plan_arrival
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.finding import find_arm
@@ -93,7 +93,7 @@ def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: Res
         goal: The main part at its goal, with the obstacles there.
     """
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
-    line = plan_arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
+    line = plan_arrival_line(plan_arrival(assembly, placing.moves, placing.contacts, now), goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 

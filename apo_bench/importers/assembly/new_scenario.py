@@ -9,12 +9,12 @@ import numpy as np
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
 from apo_bench.geometry import Array, Solid, measure_extent, pose
+from apo_bench.importers.assembly.contact_search import close_contacts, find_clashes, find_contacts, walls_without_play
 from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
 from apo_bench.importers.assembly.grasps import FoundGrasps, find_grasps
-from apo_bench.importers.assembly.ordering import OrderSearch, Placing
-from apo_bench.importers.assembly.posed import TABLE, PosedPart
+from apo_bench.importers.assembly.order_search import OrderSearch, Placing
+from apo_bench.importers.assembly.posed_parts import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
-from apo_bench.importers.assembly.touching import close_contacts, find_clashes, find_contacts, walls_without_play
 from apo_bench.importers.cad.solids import find_free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site

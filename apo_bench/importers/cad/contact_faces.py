@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from apo_bench.geometry import Array, Face, RoundFace, count_sides, list_rings, straighten
-from apo_bench.importers.cad.faces.fitting import ON_WALL
+from apo_bench.importers.cad.faces.surface_fitting import ON_WALL
 from apo_bench.importers.cad.solids import RawSolid, Region, find_square_axes
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 

@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 
 from apo_bench.geometry import Hull
-from apo_bench.importers.cad.pieces.cutting import Cut
+from apo_bench.importers.cad.pieces.convex_cutting import Cut
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, convert_to_mesh
 from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
 

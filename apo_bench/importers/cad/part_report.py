@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.importers.cad.importing import ImportedPart
 from apo_bench.importers.cad.meshes.mesh_file import CadFile
+from apo_bench.importers.cad.part_import import ImportedPart
 from apo_bench.importers.cad.solids import Region, clean_title
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, measure_height, measure_round
+from apo_bench.assembly import Assembly, Contact, Poses, measure_height, measure_round_pair
 from apo_bench.geometry import RoundFace, measure_face_area, measure_lateral_gap
 
 
@@ -12,7 +12,7 @@ class ContactFit(NamedTuple):
     """The misfit of contacts; of several contacts the largest gap and the largest angle."""
 
     gap_m: float
-    """Distance of the centre of the smaller face from the other face; for round faces as in `measure_round`."""
+    """Distance of the centre of the smaller face from the other face; for round faces as in `measure_round_pair`."""
     angle_rad: float
     """Angle between one normal and the opposite of the other; for round faces between axes."""
 
@@ -32,7 +32,7 @@ def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
     """Measure the misfit of one contact."""
     (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
-        measured = measure_round(a, T_a, b, T_b)
+        measured = measure_round_pair(a, T_a, b, T_b)
         return ContactFit(abs(measured.gap_m), measured.angle_rad)
     # From the centre of the smaller face: height above the plane of the larger one, and distance outside its outline.
     if measure_face_area(a) > measure_face_area(b):

@@ -19,7 +19,12 @@ from apo_bench.importers.recording.observed_operation import LoggedOperation, ob
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
 from apo_bench.importers.recording.rest_intervals import find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.perception.observation.models import UNSEEN_DEVIATION, add_shared_error, find_last_seen, floor_covariance
+from apo_bench.perception.observation.models import (
+    UNOBSERVED_DEVIATION,
+    add_shared_error,
+    find_last_observed_poses,
+    floor_covariance,
+)
 from apo_bench.scenario import Scenario, place_layout
 
 
@@ -79,7 +84,7 @@ def import_recording(
     observed = np.array([operation.rest is not None for operation in operations])
     poses = np.tile(np.eye(4), (len(operations), 1, 1))
     # The error that differs from frame to frame averages out; the constant one is added in full.
-    covariance = np.tile(np.diag(UNSEEN_DEVIATION**2), (len(operations), 1, 1))
+    covariance = np.tile(np.diag(UNOBSERVED_DEVIATION**2), (len(operations), 1, 1))
     for k, (_, rest, *_) in enumerate(operations):
         if rest is not None:
             poses[k] = X @ rest.T
@@ -87,7 +92,7 @@ def import_recording(
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
-        poses=find_last_seen(assembly, arrangement.start, poses, observed),
+        poses=find_last_observed_poses(assembly, arrangement.start, poses, observed),
         covariance=floor_covariance(covariance + _adjustments(operations, assembly)),
         observed=observed,
         gap_m=scenario.gap_mm * 1e-3,

@@ -74,7 +74,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     return pose.rigid(np.stack([x, np.cross(z, x), z], axis=1), origin)
 
 
-def _two_views() -> tuple[PinholeView, ...]:
+def _make_two_views() -> tuple[PinholeView, ...]:
     """Two cameras on opposite sides of the viewed point, 400 x 300 pixels, opening angle 48 degrees."""
     reach = 0.67
     height_m = 0.67
@@ -83,7 +83,7 @@ def _two_views() -> tuple[PinholeView, ...]:
     return tuple(PinholeView(look_at(at + way, at), 400, 300, 48.0) for way in ways)
 
 
-VIEWS = _two_views()
+VIEWS = _make_two_views()
 """Two opposite views, 45 degrees above the table: together they cover every side of a part.
 
 One view is not enough: of a stick in a tower only the two ends are visible, each from one side only. At 0.95 m a pixel
@@ -91,7 +91,7 @@ is 3 mm wide.
 """
 
 
-def sense(image: RangeImage, level_m: float, rng: np.random.Generator) -> Array:
+def simulate_range_image(image: RangeImage, level_m: float, rng: np.random.Generator) -> Array:
     """Add measurement errors and dropouts to true distances.
 
     Unit draws are scaled by the noise level, so equal seeds give proportional errors at all levels.

@@ -7,7 +7,13 @@ import numpy as np
 
 from apo_bench.assembly import Contact, FacingPair, Observation, PartFace
 from apo_bench.geometry import Array
-from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
+from apo_bench.perception.detection.thresholds import (
+    PairThresholds,
+    Rules,
+    compute_contact_covariance,
+    compute_contact_slack,
+    compute_pair_thresholds,
+)
 
 _IMPLIED = 1.0
 """A candidate with a smaller `gain` is implied by the contacts already taken."""
@@ -19,11 +25,11 @@ class Candidate(NamedTuple):
     contact: Contact
     pair: FacingPair
     """Measured gap and tilts at the current poses."""
-    slope: Array
+    jacobian: Array
     """(r, 6 n): derivative of its residual by body twists of all poses; r is 3 for flat faces."""
     noise: Array
-    """(r, r): covariance of the residual of a true contact, see `reality`."""
-    most: PairThresholds
+    """(r, r): covariance of the residual of a true contact, see `compute_contact_covariance`."""
+    largest_distance: PairThresholds
     """Largest gap and angle that the noise explains."""
     distance: float
     """Squared Mahalanobis length of its residual."""
@@ -35,7 +41,7 @@ class Candidate(NamedTuple):
     """Normal of the environment face, (3,), world; zero for round faces."""
 
     @property
-    def implied(self) -> bool:
+    def is_implied(self) -> bool:
         """True if the contacts taken before already make these faces touch, so there is nothing to decide."""
         return self.gain < _IMPLIED
 
@@ -45,7 +51,7 @@ class Candidate(NamedTuple):
         return self.contact.manipulated.part, self.contact.environment.part
 
 
-def judge_pair(
+def make_candidate(
     seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: FacingPair, slope: Array, C: Array
 ) -> Candidate | None:
     """Make a candidate, with gain 0, of a pair of faces of parts a and b; None if it exceeds the thresholds.
@@ -57,8 +63,8 @@ def judge_pair(
     """
     contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
     play_m = seen.assembly.play(contact, seen.play_m)
-    noise = reality(pair, play_m)
-    most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
+    noise = compute_contact_covariance(pair, play_m)
+    most = compute_pair_thresholds(rules, C, compute_contact_slack(pair, play_m), pair.lengths)
     if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
         return None
     # Squared Mahalanobis length: C comes from the poses, noise from the play and softness of a true contact.

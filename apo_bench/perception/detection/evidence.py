@@ -22,7 +22,7 @@ class Evidence:
     """Angle between one normal and the opposite of the other, or between the axes of round faces."""
     share: float
     """Overlap as a fraction of the smaller face."""
-    most: PairThresholds
+    largest_distance: PairThresholds
     """Largest gap and angle that were allowed."""
     seen_gap_m: float
     """The gap at the observed poses."""
@@ -50,7 +50,7 @@ class DetectedContacts:
     rival: Rival | None = None
 
 
-def without_contacts(observation: Observation) -> Observation:
+def remove_contacts(observation: Observation) -> Observation:
     """The observation with all contacts and gaps removed."""
     return replace(observation, assembly=replace(keep_evident_contacts(observation.assembly, ()), gaps={}))
 

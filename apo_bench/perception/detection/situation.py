@@ -9,12 +9,12 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Contact, FacingPair, Observation
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.detection.belief import Belief, PartBeliefs
-from apo_bench.perception.detection.candidate import Candidate, judge_pair
-from apo_bench.perception.detection.estimate import PoseEstimate
-from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds
+from apo_bench.perception.detection.candidate import Candidate, make_candidate
+from apo_bench.perception.detection.kalman_filter import PartBeliefs, PoseBelief
+from apo_bench.perception.detection.pose_estimate import PoseEstimate
+from apo_bench.perception.detection.thresholds import PairThresholds, Rules, compute_pair_thresholds
 
 _FLAT_M = 0.2e-3
 """Standard deviation of a gap from the error of linearisation; smaller gaps are no evidence."""
@@ -47,19 +47,19 @@ class Situation:
         return self.seen.assembly.operations[self.k].moves
 
     @cached_property
-    def now(self) -> PartBeliefs:
+    def poses_now(self) -> PartBeliefs:
         """Poses of all parts after operation k, and their Jacobians by errors of the estimated poses."""
         known = self.estimate
-        return Belief(known.assembly, self.seen.start, known.poses, known.covariance).standing(self.k)
+        return PoseBelief(known.assembly, self.seen.start, known.poses, known.covariance).parts_after(self.k)
 
-    def pairs(self) -> Iterator[tuple[str, str]]:
+    def list_part_pairs(self) -> Iterator[tuple[str, str]]:
         """Yield each moved part with each part in place, unless their relative pose depends on an unobserved pose."""
         for a in self.moves:
             for b in self.others:
-                if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
+                if not self._relative_jacobian(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
                     yield a, b
 
-    def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
+    def point_variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
         """Variances (k,) of the position of a point of part a relative to part b, [m^2].
 
         Args:
@@ -67,44 +67,46 @@ class Situation:
             at: (3,), the point, world, [m].
         """
         # A world twist (v, w) moves a point p by v + w x p, so along d by d . v + (p x d) . w.
-        J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._reach(a, b)
+        J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._relative_jacobian(a, b)
         return np.maximum(np.einsum("ki,ij,kj->k", J, self.estimate.covariance, J), 0.0)
 
-    def middle(self, part: str) -> Array:
+    def box_center(self, part: str) -> Array:
         """The centre of the bounding box of a part, (3,), world, [m]."""
-        return pose.apply(self.now.poses[part], self.seen.assembly.solids[part].bounds.mean(axis=0)[None])[0]
+        return pose.apply(self.poses_now.poses[part], self.seen.assembly.solids[part].bounds.mean(axis=0)[None])[0]
 
-    def candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
+    def list_candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
         """The pairs of faces within the thresholds that were not taken yet."""
-        candidates = list[Candidate]()
-        for a, b in self.pairs():
+        list_candidates = list[Candidate]()
+        for a, b in self.list_part_pairs():
             known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
             of_a = self.seen.assembly.solids[a]
             of_b = self.seen.assembly.solids[b]
-            most = self._bounds(rules, a, b)
+            most = self._bound_thresholds(rules, a, b)
             bounds = {"gap_m": most.gap_m, "angle_rad": most.angle_rad, "share": rules.share}
-            for pair in facing(of_a, self.now.poses[a], of_b, self.now.poses[b], **bounds, known=known):
-                candidates += self._judged(rules, a, b, pair)
-        return tuple(candidates)
+            for pair in find_facing_pairs(
+                of_a, self.poses_now.poses[a], of_b, self.poses_now.poses[b], **bounds, known=known
+            ):
+                list_candidates += self._make_candidates(rules, a, b, pair)
+        return tuple(list_candidates)
 
-    def _judged(self, rules: Rules, a: str, b: str, pair: FacingPair) -> Iterator[Candidate]:
+    def _make_candidates(self, rules: Rules, a: str, b: str, pair: FacingPair) -> Iterator[Candidate]:
         """Yield the pair as a candidate with its gain; nothing if it exceeds the thresholds."""
-        J = pair.slope @ self._reach(a, b)
+        J = pair.slope @ self._relative_jacobian(a, b)
         C = J @ self.estimate.covariance @ J.T
-        candidate = judge_pair(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
+        candidate = make_candidate(self.seen, rules, a, b, self.poses_now.poses[b], pair, J, C)
         if candidate is not None:
             soft = candidate.noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
             room = J @ self.estimate.room @ J.T
             gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
             yield candidate._replace(gain=gain)
 
-    def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
+    def _bound_thresholds(self, rules: Rules, a: str, b: str) -> PairThresholds:
         """An upper bound of the thresholds of all pairs of faces of two parts.
 
         It combines the least certain direction at the middle of part a with the turn over half the smaller diagonal.
         """
-        at = self.middle(a)
-        reach = self._reach(a, b)
+        at = self.box_center(a)
+        reach = self._relative_jacobian(a, b)
         shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
         C = shifted @ self.estimate.covariance @ shifted.T
         shift, turn = (max(float(np.linalg.eigvalsh(block)[-1]), 0.0) for block in (C[:3, :3], C[3:, 3:]))
@@ -114,8 +116,8 @@ class Situation:
         )
         play_m = self.seen.play_m
         loose = PairThresholds(_LOOSE.gap_m + play_m, _LOOSE.angle_rad + 2.0 * hypot(play_m, play_m) / _NARROW_M)
-        return pair_thresholds(rules, worst, loose)
+        return compute_pair_thresholds(rules, worst, loose)
 
-    def _reach(self, a: str, b: str) -> Array:
+    def _relative_jacobian(self, a: str, b: str) -> Array:
         """(6, 6 n): Jacobian of the world twist of part a relative to part b by the body twists of the poses."""
-        return self.now.reach[a] - self.now.reach[b]
+        return self.poses_now.reach[a] - self.poses_now.reach[b]

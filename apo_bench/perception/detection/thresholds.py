@@ -22,7 +22,7 @@ _SOFT_RAD = math.radians(0.1)
 class Rules:
     """The bounds within which a pair of faces counts as a contact."""
 
-    miss: float = 1e-4
+    miss_rate: float = 1e-4
     """Probability that the noise hides one true contact; 20 contacts, three tests each, are all found in 99.4 %."""
     gap_m: float = 10e-3
     """No gap beyond this counts as noise."""
@@ -32,16 +32,16 @@ class Rules:
     """Least overlap as a fraction of the smaller face."""
 
     def __post_init__(self) -> None:
-        for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
+        for name, high in (("miss_rate", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
             value = getattr(self, name)
             require(
                 isinstance(value, int | float) and 0.0 < value < high,
                 f"{name}={value!r} was given as a rule of recognition; above 0 and below {high:g} is allowed.",
             )
 
-    def most_of(self, count: int) -> float:
+    def largest_explained(self, count: int) -> float:
         """Largest squared Mahalanobis length of `count` residuals that the noise explains: a chi-square quantile."""
-        return _quantile(self.miss, count)
+        return _chi_square_quantile(self.miss_rate, count)
 
 
 RULES_BY_NOISE = Rules()
@@ -55,7 +55,7 @@ class PairThresholds(NamedTuple):
     angle_rad: float
 
 
-def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, lengths: int = 1) -> PairThresholds:
+def compute_pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, lengths: int = 1) -> PairThresholds:
     """The largest gap and angle that noise and play explain, within the bounds.
 
     The gap is Gaussian and two-sided. The angle is the length of two Gaussian tilts, both taken as uncertain as the
@@ -66,13 +66,13 @@ def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, leng
         slack: Gap and angle that play allows in addition.
         lengths: How many rows are lengths; the tilts follow. Without tilts only `rules` limits the angle.
     """
-    gap = _longest(rules.miss, covariance[:lengths, :lengths], CONTACT_SOFT_M)
-    angle = _longest(rules.miss, covariance[lengths:, lengths:], _SOFT_RAD)
+    gap = _length_quantile(rules.miss_rate, covariance[:lengths, :lengths], CONTACT_SOFT_M)
+    angle = _length_quantile(rules.miss_rate, covariance[lengths:, lengths:], _SOFT_RAD)
     return PairThresholds(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
 
 
-def _longest(miss: float, covariance: Array, soft: float) -> float:
-    """The length of a Gaussian vector that is exceeded with probability `miss`; infinite if it has no component.
+def _length_quantile(miss: float, covariance: Array, soft: float) -> float:
+    """The length of a Gaussian vector that is exceeded with probability `miss_rate`; infinite if it has no component.
 
     Args:
         covariance: (r, r); all directions are taken as uncertain as the least certain one.
@@ -81,21 +81,21 @@ def _longest(miss: float, covariance: Array, soft: float) -> float:
     if len(covariance) == 0:
         return math.inf
     if len(covariance) == 1:
-        return _two_sided(miss) * math.sqrt(covariance[0, 0] + soft**2)
+        return _normal_quantile(miss) * math.sqrt(covariance[0, 0] + soft**2)
     # The length of r Gaussian numbers of equal variance has a chi distribution with r degrees of freedom, scaled by the
     # standard deviation. For two it is the Rayleigh distribution, whose quantile has a closed form.
     worst = max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)
     if len(covariance) == 2:
         return math.sqrt(-2.0 * math.log(miss) * (worst + soft**2))
-    return math.sqrt(_quantile(miss, len(covariance)) * (worst + soft**2))
+    return math.sqrt(_chi_square_quantile(miss, len(covariance)) * (worst + soft**2))
 
 
-def slack(pair: FacingPair, play_m: float) -> PairThresholds:
+def compute_contact_slack(pair: FacingPair, play_m: float) -> PairThresholds:
     """Gap and tilt that a true contact with this play per side can have."""
     return PairThresholds(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
 
 
-def reality(pair: FacingPair, play_m: float) -> Array:
+def compute_contact_covariance(pair: FacingPair, play_m: float) -> Array:
     """The covariance (r, r) of gap and tilts of a true contact: uniform within its play, plus softness, [m, rad].
 
     r is 3 for flat faces.
@@ -108,14 +108,14 @@ def reality(pair: FacingPair, play_m: float) -> Array:
 
 
 @lru_cache
-def _quantile(miss: float, count: int) -> float:
+def _chi_square_quantile(miss: float, count: int) -> float:
     from scipy.stats import chi2
 
     return float(chi2.isf(miss, count))
 
 
 @lru_cache
-def _two_sided(miss: float) -> float:
+def _normal_quantile(miss: float) -> float:
     from scipy.stats import norm
 
     return float(norm.isf(miss / 2))

@@ -11,10 +11,10 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import RAISED, InputError, failed, require, unknown
 from apo_bench.names import resolve
+from apo_bench.perception.observation.function_noise import make_function_noise
 from apo_bench.perception.observation.models import NoiseLevel
-from apo_bench.perception.observation.models.failures import make_failures
-from apo_bench.perception.observation.noise_file import noise_path, presets
-from apo_bench.perception.observation.plain import declare
+from apo_bench.perception.observation.models.camera_failures import make_failures
+from apo_bench.perception.observation.noise_file import find_noise_path, list_presets
 from apo_bench.records import FAILURES
 
 __all__ = ["FAILURES", "NOISES", "Noise", "NoiseLevel", "make_noise"]
@@ -23,16 +23,16 @@ Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 NOISES = MappingProxyType(
     {
         "isotropic": "apo_bench.perception.observation.models.isotropic:IsotropicNoise",
-        "anisotropic": "apo_bench.perception.observation.models.sighted:AnisotropicNoise",
+        "anisotropic": "apo_bench.perception.observation.models.line_of_sight:AnisotropicNoise",
         "per-part": "apo_bench.perception.observation.models.isotropic:PerPartNoise",
-        "camera": "apo_bench.perception.observation.models.sighted:CameraNoise",
+        "camera": "apo_bench.perception.observation.models.line_of_sight:CameraNoise",
         "heavy-tailed": "apo_bench.perception.observation.models.isotropic:HeavyTailedNoise",
         "outliers": "apo_bench.perception.observation.models.outliers:OutlierNoise",
-        "bias": "apo_bench.perception.observation.models.shared:BiasNoise",
-        "bias-view": "apo_bench.perception.observation.models.shared:ViewBiasNoise",
-        "correlated": "apo_bench.perception.observation.models.shared:CorrelatedNoise",
-        "symmetric": "apo_bench.perception.observation.models.symmetric:SymmetricNoise",
-        **dict.fromkeys(FAILURES, "apo_bench.perception.observation.models.failures:make_failures"),
+        "bias": "apo_bench.perception.observation.models.shared_bias:BiasNoise",
+        "bias-view": "apo_bench.perception.observation.models.shared_bias:ViewBiasNoise",
+        "correlated": "apo_bench.perception.observation.models.shared_bias:CorrelatedNoise",
+        "symmetric": "apo_bench.perception.observation.models.symmetric_parts:SymmetricNoise",
+        **dict.fromkeys(FAILURES, "apo_bench.perception.observation.models.camera_failures:make_failures"),
     }
 )
 _RATES = MappingProxyType({"p": "rate", "r": "repeat"})
@@ -59,26 +59,26 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
             f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.",
         )
     if isinstance(given, str):
-        if noise_path(given) is not None:
-            from apo_bench.perception.observation.noise_file import noise_of_file
+        if find_noise_path(given) is not None:
+            from apo_bench.perception.observation.noise_file import make_noise_of_file
 
-            if (measured := noise_of_file(given, noise_level)) is not None:
+            if (measured := make_noise_of_file(given, noise_level)) is not None:
                 return measured
         if ":" not in given and given not in NOISES:
-            raise InputError(_unknown(given, (*NOISES, *presets())))
+            raise InputError(_unknown_name_error(given, (*NOISES, *list_presets())))
         if given.partition(":")[0] in FAILURES:
-            return _failing(given, noise_level)
+            return _make_failures(given, noise_level)
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
     try:
-        return _noise(model, name, noise_level)
+        return _instantiate(model, name, noise_level)
     except InputError:
         raise
     except RAISED as error:
         raise failed(f"the noise model '{name}'", error) from error
 
 
-def _failing(given: str, noise_level: NoiseLevel) -> Noise:
+def _make_failures(given: str, noise_level: NoiseLevel) -> Noise:
     """Make the failure model of a name with rates, such as `flips:p=0.1/r=0.5`."""
     name, colon, stated = given.partition(":")
     entries = [entry.partition("=") for entry in stated.split("/")] if colon else []
@@ -93,27 +93,27 @@ def _failing(given: str, noise_level: NoiseLevel) -> Noise:
     return make_failures(name, noise_level, **rates)
 
 
-def _noise(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
+def _instantiate(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
     """Make a noise model of a resolved object: instantiate a class, wrap a plain function `(poses, rng) -> poses`."""
     if isinstance(model, type):
         model = model(noise_level)
     # A function that accepts two or three arguments is plain if it declares its deviation.
-    plain = _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3))
+    plain = _accepts_arguments(model, 2) and (hasattr(model, "deviation_mm") or not _accepts_arguments(model, 3))
     require(
-        plain or _takes(model, 3),
+        plain or _accepts_arguments(model, 3),
         f"the noise model '{name}' cannot be called with (assembly, shown, rng); give a function of these that returns "
         "an Observation.",
     )
-    return declare(model, name) if plain else model
+    return make_function_noise(model, name) if plain else model
 
 
-def _unknown(given: str, names: Iterable[str]) -> str:
+def _unknown_name_error(given: str, names: Iterable[str]) -> str:
     """The error message for an unknown name."""
     sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
     return sentence + " Or give your own as 'package.module:name'."
 
 
-def _takes(model: Any, arguments: int) -> bool:
+def _accepts_arguments(model: Any, arguments: int) -> bool:
     """True if `model` can be called with this number of positional arguments."""
     try:
         inspect.signature(model).bind(*[None] * arguments)

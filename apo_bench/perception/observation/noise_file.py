@@ -18,8 +18,8 @@ from apo_bench.perception.observation.models import (
     FittedNoise,
     MeasuredNoise,
     NoiseLevel,
-    Split,
-    Tail,
+    StudentT,
+    TruncatedTails,
     load_empirical_noise,
 )
 from apo_bench.records import RESIDUALS
@@ -28,13 +28,13 @@ from apo_bench.scenario.values import Pose
 
 _FARTHEST_MM = 1e5
 """Largest allowed distance of an outlier."""
-_HUGE = 1e300
+_INFINITE_FREEDOM = 1e300
 """Largest degrees of freedom in a file; read as infinite, which is a Gaussian."""
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 _Freedom = Annotated[float, Meta(ge=LEAST_FREEDOM)]
 
 
-def _split_table(name: str, unit: str) -> Any:
+def _make_split_table_type(name: str, unit: str) -> Any:
     """Make the type of a table that states the distribution of errors across and along a camera ray."""
     fields = [
         (f"limit_{unit}", Annotated[float, Meta(ge=1e-3)]),
@@ -46,9 +46,9 @@ def _split_table(name: str, unit: str) -> Any:
     return msgspec.defstruct(name, fields, bases=(FileTable,), frozen=True)
 
 
-ShiftTable = _split_table("ShiftTable", "mm")
+ShiftTable = _make_split_table_type("ShiftTable", "mm")
 """Table `[shift]`: errors of the position."""
-TurnTable = _split_table("TurnTable", "deg")
+TurnTable = _make_split_table_type("TurnTable", "deg")
 """Table `[turn]`: errors of the rotation."""
 
 
@@ -65,12 +65,12 @@ class NoiseFileTable(FileTable, frozen=True, kw_only=True):
     camera: Pose | None = None
 
 
-def presets() -> Mapping[str, Path]:
+def list_presets() -> Mapping[str, Path]:
     """Return the noise files of the package: name -> path."""
     return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
 
 
-def noise_path(name: str) -> Path | None:
+def find_noise_path(name: str) -> Path | None:
     """Return the file that the name of a noise model refers to; None if the name refers to no file.
 
     Args:
@@ -81,16 +81,16 @@ def noise_path(name: str) -> Path | None:
         return Path(name.removeprefix(RESIDUALS))
     if name.endswith(".toml"):
         return Path(name)
-    return presets().get(name)
+    return list_presets().get(name)
 
 
-def noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | None:
-    """Make the noise model of a name as in `noise_path`; None if the name refers to no file.
+def make_noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | None:
+    """Make the noise model of a name as in `find_noise_path`; None if the name refers to no file.
 
     Raises:
         InputError: The file is not valid; the message names file and place.
     """
-    path = noise_path(name)
+    path = find_noise_path(name)
     if path is None:
         return None
     if name.startswith(RESIDUALS):
@@ -106,13 +106,13 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
         InputError: The file is not valid; the message names file and place.
     """
     top = read_typed(path, NoiseFileTable, "noise file")
-    shift = _split(top.shift, f"{path}, shift", 1000.0)
+    shift = _read_split(top.shift, f"{path}, shift", 1000.0)
     far = top.outlier_farthest_mm
     require(far >= shift.limit, f"{path}, outlier_farthest_mm: the limit of the shift or more is needed, not {far:g}.")
     measured = MeasuredNoise(
         source=top.source,
         shift_mm=shift,
-        turn_deg=_split(top.turn, f"{path}, turn", 180.0),
+        turn_deg=_read_split(top.turn, f"{path}, turn", 180.0),
         missed=top.missed_rate,
         outliers=top.outlier_rate,
         farthest_mm=far,
@@ -120,7 +120,7 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     return measured, Camera() if top.camera is None else Camera(top.camera.matrix)
 
 
-def _split(table: msgspec.Struct, place: str, largest: float) -> Split:
+def _read_split(table: msgspec.Struct, place: str, largest: float) -> TruncatedTails:
     """Make the distribution of a `[shift]` or `[turn]` table.
 
     Args:
@@ -132,39 +132,39 @@ def _split(table: msgspec.Struct, place: str, largest: float) -> Split:
     low = 0.9 * SMALLEST_SCALE * limit  # 0.9 is a margin for rounded numbers in a file
     for scale in (across_scale, along_scale):
         require(low <= scale <= limit, f"{place}: scales from {low:g} to the limit are needed, not {scale:g}.")
-    return Split(_tail(across_scale, across_freedom), _tail(along_scale, along_freedom), limit)
+    return TruncatedTails(_read_tail(across_scale, across_freedom), _read_tail(along_scale, along_freedom), limit)
 
 
-def _tail(scale: float, freedom: float) -> Tail:
-    """The tail of numbers in a file, where `_HUGE` stands for infinite degrees of freedom."""
-    return Tail(scale, freedom if freedom < _HUGE else math.inf)
+def _read_tail(scale: float, freedom: float) -> StudentT:
+    """The tail of numbers in a file, where `_INFINITE_FREEDOM` stands for infinite degrees of freedom."""
+    return StudentT(scale, freedom if freedom < _INFINITE_FREEDOM else math.inf)
 
 
-def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
+def format_noise_file(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
     """Return the text of a noise file, with notes as comments at its head."""
     document = {
         "schema": "apo-bench/noise/2",
         "source": measured.source,
-        "missed_rate": _digits(measured.missed),
-        "outlier_rate": _digits(measured.outliers),
-        "outlier_farthest_mm": _digits(measured.farthest_mm),
-        "shift": _split_form(measured.shift_mm, "mm"),
-        "turn": _split_form(measured.turn_deg, "deg"),
+        "missed_rate": _round_digits(measured.missed),
+        "outlier_rate": _round_digits(measured.outliers),
+        "outlier_farthest_mm": _round_digits(measured.farthest_mm),
+        "shift": _format_split(measured.shift_mm, "mm"),
+        "turn": _format_split(measured.turn_deg, "deg"),
     }
     return "".join(f"# {note}\n" for note in notes) + format_toml(document)
 
 
-def _split_form(split: Split, unit: str) -> dict[str, float]:
-    """The `[shift]` or `[turn]` table of a distribution; the inverse of `_split`."""
+def _format_split(split: TruncatedTails, unit: str) -> dict[str, float]:
+    """The `[shift]` or `[turn]` table of a distribution; the inverse of `_read_split`."""
     return {
-        f"limit_{unit}": _digits(split.limit),
-        f"across_scale_{unit}": _digits(split.across.scale),
-        "across_degrees_of_freedom": min(_digits(split.across.freedom), _HUGE),
-        f"along_scale_{unit}": _digits(split.along.scale),
-        "along_degrees_of_freedom": min(_digits(split.along.freedom), _HUGE),
+        f"limit_{unit}": _round_digits(split.limit),
+        f"across_scale_{unit}": _round_digits(split.across.scale),
+        "across_degrees_of_freedom": min(_round_digits(split.across.freedom), _INFINITE_FREEDOM),
+        f"along_scale_{unit}": _round_digits(split.along.scale),
+        "along_degrees_of_freedom": min(_round_digits(split.along.freedom), _INFINITE_FREEDOM),
     }
 
 
-def _digits(x: float) -> float:
+def _round_digits(x: float) -> float:
     """Round to five significant digits."""
     return float(f"{x:.5g}")

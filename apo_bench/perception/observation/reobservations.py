@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import require
 from apo_bench.perception.observation.noise import Noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 from apo_bench.records import check
 
 
@@ -36,8 +36,8 @@ class Reobservations:
             rng: A separate generator, not the one of the first observation.
             allowed: Number of reobservations.
             assembly: The assembly in the observations, where its contacts are wrong on purpose. Default: the right one.
-            first: A generator in the state in which the first observation used it. A noise model with a method `again`
-                (assembly, demonstration, rng, first) can repeat failures of the first observation.
+            first: A generator in the state in which the first observation used it. A noise model with a method
+                `reobserve` (assembly, demonstration, rng, first) can repeat failures of the first observation.
 
         Raises:
             InputError: `allowed` is out of range.
@@ -63,7 +63,7 @@ class Reobservations:
             chosen and all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen),
             f"operations {[*chosen]} cannot be reobserved; give one or more whole numbers from 0 to {n - 1}.",
         )
-        again = getattr(self._noise, "again", None)
+        again = getattr(self._noise, "reobserve", None)
         noise = self._noise if again is None or self._first is None else partial(again, first=deepcopy(self._first))
         look = observe(self._demonstration, noise, self._rng)
         self.left -= 1

@@ -28,7 +28,7 @@ from apo_bench.assembly import (
     faces_oppose,
     find_round_pairs,
     measure_height,
-    measure_round,
+    measure_round_pair,
 )
 from apo_bench.errors import RAISED, InputError, failed, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, compute_overlap
@@ -44,7 +44,7 @@ TOUCHING_M = 0.5e-3
 """Faces with a smaller gap touch, or nearly, so they make no false contact."""
 NEAR_FACES_M = 15e-3
 """Faces with a smaller gap are near enough to be mistaken for a contact."""
-_COVERED_M2 = 25e-6
+_LEAST_OVERLAP_M2 = 25e-6
 """Flat faces overlap if the area is larger, (5 mm)^2."""
 _SHARED = 0.15
 """Round faces overlap if they share a larger fraction of their length."""
@@ -90,7 +90,7 @@ def replace_contacts(
     name = f"the source of contacts '{getattr(source, '__name__', type(source).__name__)}'"
     try:
         wrong = source(observation.assembly, observation.start, truth, rng)
-        complaint = _complaint(observation.assembly, wrong)
+        complaint = _find_fault(observation.assembly, wrong)
     except InputError:
         raise
     except RAISED as error:
@@ -99,7 +99,7 @@ def replace_contacts(
     return replace(observation, assembly=wrong)
 
 
-def _complaint(right: Assembly, wrong: Any) -> str:
+def _find_fault(right: Assembly, wrong: Any) -> str:
     """Return the fault of the value that a contact source returned, as the end of an error message; empty if valid."""
     if not isinstance(wrong, Assembly):
         return f"returned {type(wrong).__name__}; return an Assembly"
@@ -115,7 +115,7 @@ def _complaint(right: Assembly, wrong: Any) -> str:
     return ""
 
 
-def culprit(right: Assembly, wrong: Assembly) -> str | None:
+def find_wrong_relation(right: Assembly, wrong: Assembly) -> str | None:
     """The first relation (R1, R2, ...) of the wrong relation graph that contains a wrong contact; None if none does."""
     arcs = build_relation_graph(wrong).arcs
     return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
@@ -123,8 +123,10 @@ def culprit(right: Assembly, wrong: Assembly) -> str | None:
 
 def omit_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
     """Remove one contact, chosen at random."""
-    k, contact = _any(assembly, rng)
-    return _with(assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact))
+    k, contact = _draw_contact(assembly, rng)
+    return _replace_contacts_of_operation(
+        assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact)
+    )
 
 
 def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
@@ -133,7 +135,7 @@ def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.G
     If there are none, the nearest overlapping pair is taken, else the nearest opposed pair. An assembly without opposed
     faces is returned unchanged.
     """
-    pairs = list(_facing(assembly, start, poses))
+    pairs = list(_list_opposed_pairs(assembly, start, poses))
     near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_FACES_M]
     if near:
         chosen = near[int(rng.integers(len(near)))]
@@ -141,7 +143,9 @@ def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.G
         chosen = min(pairs, key=lambda pair: (not pair.covered, pair.apart_m))
     else:
         return assembly
-    return _with(assembly, chosen.made, (*assembly.operations[chosen.made].contacts, chosen.contact))
+    return _replace_contacts_of_operation(
+        assembly, chosen.made, (*assembly.operations[chosen.made].contacts, chosen.contact)
+    )
 
 
 @final
@@ -156,18 +160,18 @@ class FaceOffset:
     """Length of the displacement."""
 
     def __call__(self, assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
-        k, contact = _any(assembly, rng)
+        k, contact = _draw_contact(assembly, rng)
         part, old = contact.environment
         sign = (1.0, -1.0)[int(rng.integers(2))]
-        new = _moved(assembly.face_of(contact.environment), f"{old}_shifted", self.size_m * sign, rng)
+        new = _move_face(assembly.face_of(contact.environment), f"{old}_shifted", self.size_m * sign, rng)
         instead = Contact(contact.manipulated, PartFace(part, new.name))
-        solids = {**assembly.solids, part: _with_face(assembly.solids[part], new)}
+        solids = {**assembly.solids, part: _add_face(assembly.solids[part], new)}
         contacts = tuple(instead if c == contact else c for c in assembly.operations[k].contacts)
         gaps = {**assembly.gaps, instead: assembly.gaps.get(contact, Gap())}
-        return _with(replace(assembly, solids=solids, gaps=gaps), k, contacts)
+        return _replace_contacts_of_operation(replace(assembly, solids=solids, gaps=gaps), k, contacts)
 
 
-class _Pair(NamedTuple):
+class _OpposedPair(NamedTuple):
     """Two opposed flat faces, or two round faces with nearly parallel axes, that do not touch."""
 
     made: int
@@ -179,7 +183,7 @@ class _Pair(NamedTuple):
     """True if the faces overlap."""
 
 
-def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
+def _draw_contact(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
     """Draw one of all contacts with equal probability; return the operation that makes it, and the contact."""
     relations = assembly.relations()
     require(relations, "the assembly has no contact that could be wrong; use `given`.")
@@ -187,7 +191,7 @@ def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
     return chosen.made, chosen.contact
 
 
-def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
+def _list_opposed_pairs(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_OpposedPair]:
     """Yield the opposed pairs that do not touch, of moved parts and parts in place, after each operation."""
     standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
     for k, stage in enumerate(compute_placements(assembly, start, poses)):
@@ -201,16 +205,16 @@ def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
                     near = apart > TOUCHING_M and faces_oppose(a, stage[part], b, stage[other], _OPPOSED_RAD)
                     if near and contact not in assembly.operations[k].contacts:
                         area = compute_overlap(a, stage[part], b, stage[other]).area
-                        yield _Pair(k, contact, apart, area > _COVERED_M2)
+                        yield _OpposedPair(k, contact, apart, area > _LEAST_OVERLAP_M2)
                 for c, d in find_round_pairs(assembly.solids[part], assembly.solids[other]):
                     contact = Contact(PartFace(part, c.name), PartFace(other, d.name))
-                    measured = measure_round(c, stage[part], d, stage[other])
+                    measured = measure_round_pair(c, stage[part], d, stage[other])
                     near = measured.angle_rad < _OPPOSED_RAD and measured.gap_m > TOUCHING_M
                     if near and contact not in assembly.operations[k].contacts:
-                        yield _Pair(k, contact, measured.gap_m, measured.share > _SHARED)
+                        yield _OpposedPair(k, contact, measured.gap_m, measured.share > _SHARED)
 
 
-def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Generator) -> Face | RoundFace:
+def _move_face(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Generator) -> Face | RoundFace:
     """Move a flat face along its normal, or a round one across its axis in a random direction; rename it."""
     if isinstance(face, RoundFace):
         turn = rng.uniform(0.0, 2.0 * math.pi)
@@ -220,14 +224,14 @@ def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Gene
     return Face(name, face.outline + by, tuple(hole + by for hole in face.holes), face.fit)
 
 
-def _with_face(solid: Solid, face: Face | RoundFace) -> Solid:
+def _add_face(solid: Solid, face: Face | RoundFace) -> Solid:
     """The solid with one more face."""
     if isinstance(face, RoundFace):
         return replace(solid, rounds={**solid.rounds, face.name: face})
     return replace(solid, faces={**solid.faces, face.name: face})
 
 
-def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:
+def _replace_contacts_of_operation(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:
     """The assembly with these contacts for operation k."""
     operations = list(assembly.operations)
     operations[k] = replace(operations[k], contacts=contacts)

@@ -17,20 +17,20 @@ from apo_bench.assembly import (
     find_touched_contacts,
     measure_entrance_depth,
 )
-from apo_bench.geometry import Array, PosedPieces, compute_exit_distance, freeze, is_way_free, measure_extent
-from apo_bench.planning.insertion.attach import ANY, Attach, Preference
-from apo_bench.planning.insertion.macros import UP, Chain, Macro, StraightExit, chain, departure
-from apo_bench.planning.insertion.states import (
+from apo_bench.geometry import Array, PosedPieces, compute_exit_distance, freeze, is_path_free, measure_extent
+from apo_bench.planning.insertion.attach_line import ANY, Attach, Preference
+from apo_bench.planning.insertion.contact_states import (
     ANGLE_RAD,
     ContactState,
     Screw,
-    classify,
-    null_space,
-    screw_state,
+    classify_motions,
+    classify_with_rotations,
+    compute_null_space,
     snap_normals,
 )
+from apo_bench.planning.insertion.macros import UP, Macro, MacroChain, StraightExit, build_macro_chain, invert_macros
 
-_ROOM_M = 0.02
+_CLEARING_M = 0.02
 """Added to the exit distance: gap between the part and the walls around its goal where the line begins."""
 _TRAVEL_M = 0.03
 """Least length of the line, from its beginning to the goal."""
@@ -57,7 +57,7 @@ class Arrival:
     T: Array
     """(4, 4): pose of the main part at its place, world frame; so are all directions but that of `line`."""
     touched: tuple[TouchedContact, ...]
-    chain: Chain
+    chain: MacroChain
     """The macros by which the part comes; their contact numbers index `touched` (a round contact: once per normal)."""
     departs: tuple[Macro, ...]
     """The macros by which the part leaves again; a final lift off supports is not among them."""
@@ -81,7 +81,7 @@ class Arrival:
         """The contacts that a macro makes (`depart`: opens), each once."""
         return tuple(dict.fromkeys(self.touched[i].contact for i in macro.makes))
 
-    def own(self, direction: Array) -> Array:
+    def to_part_frame(self, direction: Array) -> Array:
         """A world direction, (3,), in the frame of the part."""
         return _to_part_frame(direction, self.T)
 
@@ -94,15 +94,15 @@ class Arrival:
             commanded; directions of the guarded macros, which end on contact; directions between walls that enclose the
             part.
         """
-        cone = classify(_normals(self.touched))
+        cone = classify_motions(_merge_normals(self.touched))
         walls = cone.rows[~cone.detachable]
-        position = _readable(null_space(cone.rows), self.T)
+        position = _align_basis(compute_null_space(cone.rows), self.T)
         felt = np.array([macro.direction for macro in self.macros if macro.guarded]).reshape(-1, 3)
-        across = _readable(null_space(null_space(walls)) if len(walls) else np.zeros((0, 3)), self.T)
+        across = _align_basis(compute_null_space(compute_null_space(walls)) if len(walls) else np.zeros((0, 3)), self.T)
         return position, felt, across
 
 
-def arrive(
+def plan_arrival(
     assembly: Assembly,
     moves: Sequence[str],
     contacts: Iterable[Contact],
@@ -121,29 +121,31 @@ def arrive(
     """
     T = poses[moves[0]]
     touched = tuple(find_touched_contacts(assembly, contacts, moves, poses))
-    normals = _normals(touched, angle_rad)
+    normals = _merge_normals(touched, angle_rad)
     moving = [PosedPieces(assembly.solids[part].pieces, poses[part]) for part in moves]
     resting = {
         part: PosedPieces(solid.pieces, poses[part]) for part, solid in assembly.solids.items() if part not in moves
     }
     direction = stated.direction
-    if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
+    if direction is not None and not classify_motions(normals).admits(
+        -(T[:3, :3] @ direction), float(np.sin(angle_rad))
+    ):
         direction = None
 
     # In the helpers below `way` is the unit vector of an exit from the goal, world frame.
     def along_is_free(way: Array, length_m: float) -> bool:
         """Whether the moving parts can move along `way` by a length."""
-        return is_way_free(moving, way, length_m, list(resting.values()))
+        return is_path_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
         """Whether an exit is free, and then the space above its end, from where the part descends."""
-        begin = [PosedPieces(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
-        return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
+        begin = [PosedPieces(posed.pieces, _translated(posed.T, length_m * way)) for posed in moving]
+        return along_is_free(way, length_m) and is_path_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
         """Length of the line for an exit distance, [m]."""
         # Line length: exit distance plus the gap, rounded up to whole millimetres unless a length is stated.
-        millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3))
+        millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _CLEARING_M) - 1e-3))
         return max(_TRAVEL_M, millimetres) if stated.travel_m is None else stated.travel_m
 
     def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
@@ -151,12 +153,12 @@ def arrive(
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]  # contacts that the exit may open
         # A stated direction leads to the goal, so the exit goes the opposite way.
-        there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
+        there = [-(T[:3, :3] @ direction)] if direction is not None else _list_exits_between_walls(along, floors, T)
 
         def length(u: Array) -> float:
             """Exit distance along `u`, [m]."""
             # Round walls may end farther out than the solids around the part require.
-            ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
+            ends = (_measure_wall_exit(assembly, touched[i], poses, u) for i in walls)
             return max(compute_exit_distance(moving, u, around), *ends)
 
         ways = list[StraightExit]()
@@ -167,16 +169,18 @@ def arrive(
         return ways[0]  # no exit is free: the first candidate, marked as not free
 
     # From here on: the part leaves walls on `macros.way`, otherwise an exit off open contacts is searched.
-    macros = chain(normals, out, float(np.sin(angle_rad)))
+    macros = build_macro_chain(normals, out, float(np.sin(angle_rad)))
     if macros.way is not None:
         line = Attach(_to_part_frame(-macros.way.direction, T), reach(macros.way.length_m))
         is_free = macros.way.free
     else:
-        there = list(_admissible(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
+        there = list(_list_admissible_exits(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
         # Parts that rest against the moving parts from above (contact normal downwards) are roofs to get out from
         # under.
         over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
-        tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
+        tried = [
+            (way, reach(far)) for way in there for far in dict.fromkeys((0.0, _measure_roof_exit(moving, way, over)))
+        ]
         # Slanted exits whose shortest extended line is free are tried with all longer lines.
         aslant = (way for way in there if stated.travel_m is None and abs(way @ UP) < _STRAIGHT)
         longer = product((way for way in aslant if along_is_free(way, _LONGER_M[0])), _LONGER_M)
@@ -188,10 +192,10 @@ def arrive(
         line = Attach(direction, line.travel_m)
     # Contacts that carry the part, since their normals point upwards.
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > _LIFTED)
-    return Arrival(moves[0], T, touched, macros, departure(macros, supports), line, is_free and not macros.locked)
+    return Arrival(moves[0], T, touched, macros, invert_macros(macros, supports), line, is_free and not macros.locked)
 
 
-def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Array) -> float:
+def _measure_wall_exit(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Array) -> float:
     """Exit distance of a part along `way` until round walls no longer enclose it, [m]; 0 for flat contacts.
 
     A loose fit counts as enclosing, too.
@@ -203,7 +207,7 @@ def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Arra
     return measure_entrance_depth(assembly, *((e, m) if touched.rests == m.part else (m, e)), poses, -way)
 
 
-def _past(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces]) -> float:
+def _measure_roof_exit(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces]) -> float:
     """Distance along `way` after which no moving part is under a roof, [m]; 0 without roofs or if `way` is steep.
 
     Args:
@@ -217,12 +221,12 @@ def _past(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces
     return max(0.0, float(np.max(ends[1]) - np.min(ends[0]))) if roofs and abs(way @ UP) < 0.5 else 0.0
 
 
-def turning_state(assembly: Assembly, arrival: Arrival, poses: Poses) -> Screw:
-    """Contact state of an arrived part with rotations included (screws); `poses` as given to `arrive`."""
-    return screw_state(*find_touch_points(assembly, arrival.touched, poses))
+def compute_screw_state(assembly: Assembly, arrival: Arrival, poses: Poses) -> Screw:
+    """Contact state of an arrived part with rotations included (screws); `poses` as given to `plan_arrival`."""
+    return classify_with_rotations(*find_touch_points(assembly, arrival.touched, poses))
 
 
-def _readable(basis: Array, T: Array) -> Array:
+def _align_basis(basis: Array, T: Array) -> Array:
     """A basis, (m, 3), of the span of `basis` that is easy to read: axes of the part come first."""
     axes: list[Array] = []
     inside = [axis for axis in T[:3, :3].T if np.linalg.norm(basis.T @ (basis @ axis) - axis) < 1e-6]
@@ -235,13 +239,13 @@ def _readable(basis: Array, T: Array) -> Array:
     return np.array(axes).reshape(-1, 3)
 
 
-def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
+def _list_admissible_exits(macros: MacroChain, normals: Array, T: Array) -> Iterator[Array]:
     """Candidate exits, unit vectors (3,), off contacts that do not enclose the part, the best first.
 
     The order: straight up; against the first and the last macro; the direction that opens all contacts; axes of the
     part; each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
     """
-    cone = classify(normals)
+    cone = classify_motions(normals)
     if macros.locked:  # no straight exit exists: any direction serves
         yield UP
         return
@@ -253,7 +257,7 @@ def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     yield from (way for way in (UP, *back, *inside, *axes, *aslant, *normals) if cone.admits(way))
 
 
-def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Array]:
+def _list_exits_between_walls(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Array]:
     """Candidate exits between walls, unit vectors (3,) in the span of `along`, the best first.
 
     The order: up, off the floors, the axes of the part (negative before positive), then the rows of `along`.
@@ -270,7 +274,7 @@ def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Arr
             yield np.round(within / size, 12) + 0.0
 
 
-def _normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) -> Array:
+def _merge_normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) -> Array:
     """Unit normals of contacts, (k, 3), with those within `angle_rad` of each other made equal."""
     return snap_normals(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
 
@@ -282,7 +286,7 @@ def _to_part_frame(direction: Array, T: Array) -> Array:
     return np.asarray(np.round(T[:3, :3].T @ direction, 12) + 0.0)
 
 
-def _shift(T: Array, by: Array) -> Array:
+def _translated(T: Array, by: Array) -> Array:
     out = np.array(T)
     out[:3, 3] += by
     return out

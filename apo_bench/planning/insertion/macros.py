@@ -1,4 +1,5 @@
-"""Macros: the straight motions by which a part comes into its contacts, found by planning its disassembly (`peel`).
+"""Macros: the straight motions by which a part comes into its contacts, found by planning its disassembly
+(`peel_contacts`).
 
 The contact that disassembly opens last is made first. Contacts that can open are made by a guarded motion, which ends
 when contact is detected. Walls that enclose the part are made by an insertion to a known position.
@@ -11,7 +12,14 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import Array, copy_frozen
-from apo_bench.planning.insertion.states import ANGLE_RAD, Cone, ContactState, classify, evenly_open, null_space
+from apo_bench.planning.insertion.contact_states import (
+    ANGLE_RAD,
+    Cone,
+    ContactState,
+    classify_motions,
+    compute_null_space,
+    find_even_opening,
+)
 
 MacroName = Literal[
     "move-to-contact",
@@ -77,7 +85,7 @@ class Layer(NamedTuple):
         return not self.cone.state.detaching and not self.cone.state.maintaining
 
 
-def peel(rows: Array) -> tuple[Layer, ...]:
+def peel_contacts(rows: Array) -> tuple[Layer, ...]:
     """Sort contacts with normals `rows`, (k, 3), into layers, from the one that disassembly removes first.
 
     Contacts that can open come first, while the others stay closed. If none can open, all that are left make one layer.
@@ -86,7 +94,7 @@ def peel(rows: Array) -> tuple[Layer, ...]:
     left = np.arange(len(rows))
     layers = []
     while len(left):
-        cone = classify(rows[left])
+        cone = classify_motions(rows[left])
         off = cone.detachable if cone.state.detaching else np.ones(len(left), dtype=np.bool_)
         layers.append(Layer(cone, tuple(left[off].tolist()), tuple(left[~off].tolist())))
         left = left[~off]
@@ -104,14 +112,14 @@ class StraightExit(NamedTuple):
     """Whether nothing else is in the way."""
 
 
-_Out = Callable[[Array, tuple[int, ...]], StraightExit]
+_FindExit = Callable[[Array, tuple[int, ...]], StraightExit]
 """Chooses the exit of a part between walls.
 
 Arguments: orthonormal directions in which all walls stay closed, (m, 3); numbers of the walls.
 """
 
 
-class Chain(NamedTuple):
+class MacroChain(NamedTuple):
     """The macros by which a part comes into its contacts."""
 
     state: ContactState
@@ -123,7 +131,7 @@ class Chain(NamedTuple):
     """Whether no straight motion leads into the contacts."""
 
 
-def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
+def build_macro_chain(normals: Array, out: _FindExit, slack: float = ANGLE_RAD) -> MacroChain:
     """The macros that make contacts with these normals.
 
     Args:
@@ -131,22 +139,22 @@ def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
         out: Chooses the exit of the part between walls.
         slack: Sine of the angle within which a direction counts as along a wall.
     """
-    layers = peel(normals)
-    state = classify(normals).state
+    layers = peel_contacts(normals)
+    state = classify_motions(normals).state
     if layers and layers[-1].locked:
-        return Chain(state, (), None, True)
+        return MacroChain(state, (), None, True)
     macros: list[Macro] = []
     way: StraightExit | None = None
     for layer in reversed(layers):
         if layer.slides_out:
-            way = out(null_space(normals[list(layer.breaks)]), layer.breaks)
-            macros.append(_insertion(layer, layers, way))
+            way = out(compute_null_space(normals[list(layer.breaks)]), layer.breaks)
+            macros.append(_name_insertion(layer, layers, way))
         else:
-            macros += _contacts(normals, layer, slack)
-    return Chain(state, tuple(macros), way, False)
+            macros += _list_contact_macros(normals, layer, slack)
+    return MacroChain(state, tuple(macros), way, False)
 
 
-def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
+def invert_macros(arrival: MacroChain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     """The macros by which a part leaves its contacts: the arrival's motions inverted, in reverse order.
 
     A final lift off supports alone is part of every transfer, so it is left out.
@@ -171,7 +179,7 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     return tuple(back)
 
 
-def _insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macro:
+def _name_insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macro:
     """The insertion between the walls of a layer: a peg into a hole, into a slot with a bottom, or between two planes.
 
     Args:
@@ -185,16 +193,16 @@ def _insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macr
     return Macro(name, -way.direction, layer.breaks, (), way.length_m)
 
 
-def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
+def _list_contact_macros(normals: Array, layer: Layer, slack: float) -> list[Macro]:
     """The guarded motions that close the contacts of a layer, one by one: down onto supports first, then sideways."""
     macros: list[Macro] = []
     left = layer.breaks
     closed_before = layer.keeps
     while left:
-        along = null_space(normals[list(closed_before)]) if closed_before else np.eye(3)
-        off, closed = _next(normals, left, along, slack)
+        along = compute_null_space(normals[list(closed_before)]) if closed_before else np.eye(3)
+        off, closed = _find_next_contacts(normals, left, along, slack)
         if not closed:  # nothing is left to move along, so the rest closes with what was made last
-            return _together(normals, layer, macros, left)
+            return _merge_into_last(normals, layer, macros, left)
         name: MacroName = "slide-to-contact" if macros else "move-to-contact"
         if layer.cone.state.constraining == 2:
             # Walls in two directions: the motion ends at the bottom of a hole.
@@ -205,7 +213,7 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
     return macros
 
 
-def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int, ...]) -> list[Macro]:
+def _merge_into_last(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int, ...]) -> list[Macro]:
     """`macros` with the last one changed so that it also closes the contacts `left`.
 
     If its direction would press into one of them, it turns to a direction that closes all evenly. If no such direction
@@ -215,19 +223,27 @@ def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int
     makes = (*last.makes, *left)
     off = -last.direction
     if (normals[list(left)] @ off <= 0.0).any():
-        off = _evenly_off(normals, makes, last.keeps)
+        off = _find_opening_direction(normals, makes, last.keeps)
         if not off.any():
-            return [replace(macros[0], direction=-_evenly_off(normals, layer.breaks, layer.keeps), makes=layer.breaks)]
+            return [
+                replace(
+                    macros[0],
+                    direction=-_find_opening_direction(normals, layer.breaks, layer.keeps),
+                    makes=layer.breaks,
+                )
+            ]
     return [*macros[:-1], replace(last, direction=-off, makes=makes)]
 
 
-def _evenly_off(normals: Array, makes: Sequence[int], keeps: Sequence[int]) -> Array:
+def _find_opening_direction(normals: Array, makes: Sequence[int], keeps: Sequence[int]) -> Array:
     """The unit direction, (3,), that opens `makes` the fastest while `keeps` stay closed; zero if there is none."""
-    along = null_space(normals[list(keeps)]) if keeps else np.eye(3)
-    return np.asarray(evenly_open(normals[list(makes)] @ along.T) @ along)
+    along = compute_null_space(normals[list(keeps)]) if keeps else np.eye(3)
+    return np.asarray(find_even_opening(normals[list(makes)] @ along.T) @ along)
 
 
-def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tuple[Array, tuple[int, ...]]:
+def _find_next_contacts(
+    normals: Array, left: Sequence[int], along: Array, slack: float
+) -> tuple[Array, tuple[int, ...]]:
     """The direction, (3,), that opens the next contacts while those made before stay closed, and the numbers of these.
 
     Straight up is preferred if that opens a contact and presses into none. Otherwise the normal of a contact is taken,
@@ -238,20 +254,20 @@ def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tu
         along: Orthonormal basis of the directions in which earlier contacts stay closed, (m, 3).
         slack: Sine of the angle within which a direction counts as along a wall.
     """
-    up = _along(UP, along)
+    up = _project_to_span(UP, along)
     opened = normals[list(left)] @ up
     carried = tuple(i for i, rate in zip(left, opened, strict=True) if rate > slack)
     if up[2] > 0.5 and carried and (opened >= -slack).all():
         return up, carried
     # Normals with z below 0.5 rank alike, in their given order.
     for i in sorted(left, key=lambda i: -max(0.5, round(float(normals[i] @ UP), 6))):
-        off = _along(normals[i], along)
+        off = _project_to_span(normals[i], along)
         if off.any():
             return off, tuple(j for j in left if normals[j] @ normals[i] > 1.0 - slack)
     return np.zeros(3), ()
 
 
-def _along(direction: Array, along: Array) -> Array:
+def _project_to_span(direction: Array, along: Array) -> Array:
     """The projection of a direction, (3,), onto the span of orthonormal rows, (m, 3), as unit vector; zero if tiny."""
     within = direction if len(along) == 3 else along.T @ (along @ direction)
     size = float(np.linalg.norm(within))

@@ -6,9 +6,9 @@ from typing import final
 
 from apo_bench.assembly import Assembly, Contact, Poses, compute_placements
 from apo_bench.geometry import Array
-from apo_bench.planning.insertion.arrival import Arrival, arrive
-from apo_bench.planning.insertion.attach import ANY, Preference
-from apo_bench.planning.insertion.states import (
+from apo_bench.planning.insertion.arrival import Arrival, plan_arrival
+from apo_bench.planning.insertion.attach_line import ANY, Preference
+from apo_bench.planning.insertion.contact_states import (
     ANGLE_RAD,
 )
 
@@ -33,7 +33,7 @@ class OperationMacros:
         return tuple(macro.name for macro in (*self.before.departs, *self.after.macros))
 
 
-def understand(
+def describe_operation_macros(
     assembly: Assembly,
     start: Poses,
     goals: Array,
@@ -54,17 +54,17 @@ def understand(
     understood: list[OperationMacros] = []
     put: dict[str, int] = {}  # main part -> its latest operation
     for k, operation in enumerate(assembly.operations):
-        was = _held_by(assembly, put.get(operation.main), operation.moves)
+        was = _find_blocking_operation(assembly, put.get(operation.main), operation.moves)
         # A part that was attached by an earlier operation leaves on the same line.
         back = ANY if was is None else understood[was].after.line.stated
-        before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
-        after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
+        before = plan_arrival(assembly, operation.moves, _list_lost_contacts(assembly, k), stages[k], back, angle_rad)
+        after = plan_arrival(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
         understood.append(OperationMacros(k, operation.main, operation.carries, before, after))
         put[operation.main] = k
     return tuple(understood)
 
 
-def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
+def _find_blocking_operation(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
     """`was`, if the contacts of that operation hold the part back; None if it has none, or all of them move along.
 
     Args:
@@ -76,6 +76,6 @@ def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int
     return was
 
 
-def _lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
+def _list_lost_contacts(assembly: Assembly, k: int) -> tuple[Contact, ...]:
     """The contacts that operation k breaks: undoing it makes them again."""
     return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)

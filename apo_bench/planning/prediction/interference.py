@@ -15,7 +15,7 @@ from apo_bench.geometry import (
     remember,
     shrink_pieces,
 )
-from apo_bench.planning.insertion.attach import Attach
+from apo_bench.planning.insertion.attach_line import Attach
 
 _SPACING_M = 0.02
 """Largest spacing of the examined positions on the line of attach, unless that takes more than `_MOST`."""
@@ -31,7 +31,7 @@ Solids = Mapping[str, Solid]
 
 
 @remember
-def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
+def make_physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
     """The parts as manufactured: fit faces recede by `clearance_mm`. Cached per assembly and clearance."""
     made = {
         name: replace(solid, pieces=shrink_pieces(solid, clearance_mm * 1e-3))
@@ -40,33 +40,35 @@ def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
     return MappingProxyType(made)
 
 
-def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
+def measure_depths_on_line(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
     """Penetration of each moving part into each resting part that it has no contact with, (r,) each, [m].
 
     Args:
         operation: The operation that moves the parts.
         planned: Pose of every part after the operation, (4, 4), or (r, 4, 4) for r robots with different errors.
         how: The line of attach; None: only the goal is examined.
-        physical: From `physical_solids`.
+        physical: From `make_physical_solids`.
 
     Returns:
         One array per pair of parts: the deepest over the examined positions; a negative depth is a distance.
     """
     touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
-    back = _way_back(planned[operation.main], how)
-    pairs = [pair for pair in _pairs(operation, physical) if frozenset(pair) not in touching]
-    return [_deepest(physical[a], planned[a], physical[b], planned[b], back) for a, b in pairs]
+    back = _list_retreat_shifts(planned[operation.main], how)
+    pairs = [pair for pair in _list_part_pairs(operation, physical) if frozenset(pair) not in touching]
+    return [_measure_deepest(physical[a], planned[a], physical[b], planned[b], back) for a, b in pairs]
 
 
-def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
+def measure_depths_from_above(
+    operation: Operation, planned: Poses, how: Attach | None, physical: Solids
+) -> list[Array]:
     """Penetration of each moving part into each resting part while it descends to the beginning of a level line, [m].
 
     Parts that are in contact at the goal count, too, since the contact is not made yet.
 
     Returns:
-        As `depths_on_way`; `-FAR_M` if the line is not level, or there is none.
+        As `measure_depths_on_line`; `-FAR_M` if the line is not level, or there is none.
     """
-    pairs = _pairs(operation, physical)
+    pairs = _list_part_pairs(operation, physical)
     goals = planned[operation.main].reshape(-1, 4, 4)
     none = np.full(len(goals), -FAR_M)
     if how is None:
@@ -77,16 +79,16 @@ def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, 
         return [none] * len(pairs)
     # Displacements of the moving part: back to the beginning of the line, then up.
     down = _ABOVE_M[:, None] * np.array([0.0, 0.0, 1.0]) - how.travel_m * ways[:, None]
-    deepest = [_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
+    deepest = [_measure_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
     return [np.where(level, each, none) for each in deepest]
 
 
-def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
+def _list_part_pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
     """(moving part, resting part) of all combinations."""
     return [(a, b) for a in operation.moves for b in physical if b not in operation.moves]
 
 
-def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array:
+def _measure_deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array:
     """The largest penetration of solid `a` into `b` over all displacements of `a`, (r,), [m]; at least `-FAR_M`.
 
     Args:
@@ -107,7 +109,7 @@ def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array
     return out
 
 
-def _way_back(goal: Array, how: Attach | None) -> Array:
+def _list_retreat_shifts(goal: Array, how: Attach | None) -> Array:
     """Displacements from goals, (4, 4) or (r, 4, 4), back along the line of attach, (r, k, 3), world frame, [m]."""
     goals = goal.reshape(-1, 4, 4)
     if how is None:

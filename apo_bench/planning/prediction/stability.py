@@ -9,7 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Meeting, Meetings, Operation, Poses, compute_placements
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    ContactMeasurements,
+    Operation,
+    OverlapOrMate,
+    Poses,
+    compute_placements,
+)
 from apo_bench.geometry import Array, Face, Overlap, RoundFace, all_boxes, find_direction_across, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
@@ -23,15 +31,17 @@ _TURNS = 2.0 * np.pi * np.arange(8) / 8
 BALANCED = 1e-7
 """Largest imbalance of a part that stands (rounding of the solver)."""
 _UP = np.array([0.0, 0.0, 1.0])
-_LEFT = float(np.sin(np.radians(30.0)))
+_RESIDUAL = float(np.sin(np.radians(30.0)))
 """Normals carry weight if forces along them leave at most this share of it, as on a floor tilted by 30 degrees."""
 _ARM_M = 0.01
 """Lever arm by which moments are divided, so that they compare with forces."""
-_ASIDE = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # level shifts of the centre of mass
-_ASIDE.flags.writeable = False
+_CENTROID_SHIFTS = np.array(
+    [[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+)  # level shifts of the centre of mass
+_CENTROID_SHIFTS.flags.writeable = False
 
 
-def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
+def find_first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
     """The first operation whose part, with what it carries, would not stand at its planned goal, counted from 0.
 
     Vertical forces act at the corners of the contact overlaps: floors push up, ceilings push down, walls carry nothing,
@@ -47,13 +57,15 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
         The operation, or None if every part would stand.
     """
     every = zip(assembly.operations, compute_placements(assembly, start, goals), strict=True)
-    known = Meetings(assembly)
+    known = ContactMeasurements(assembly)
     return next(
-        (k for k, (operation, poses) in enumerate(every) if imbalance(known, operation, poses) > BALANCED), None
+        (k for k, (operation, poses) in enumerate(every) if measure_imbalance(known, operation, poses) > BALANCED), None
     )
 
 
-def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True) -> float:
+def measure_imbalance(
+    known: ContactMeasurements, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True
+) -> float:
     """The share of the moved parts' weight, and of its moments on a 10 mm arm, that contact forces cannot balance.
 
     Args:
@@ -63,11 +75,11 @@ def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float
         ceilings: Whether faces above may push down. If not, the result is 0 for an operation without a ceiling.
     """
     assembly = known.assembly
-    centroid = _centroid(assembly, operation, poses)
-    offs = _ASIDE * room_m if room_m else _ASIDE[:1]  # row 0: no shift
+    centroid = _compute_centroid(assembly, operation, poses)
+    offs = _CENTROID_SHIFTS * room_m if room_m else _CENTROID_SHIFTS[:1]  # row 0: no shift
     if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):
-        return _of_normals(known, operation, poses, centroid + offs, ceilings)
-    points, signs, ups = _forces(known, operation, poses)
+        return _measure_general_imbalance(known, operation, poses, centroid + offs, ceilings)
+    points, signs, ups = _list_vertical_forces(known, operation, poses)
     # No contact could carry weight, or there is no ceiling to leave out: nothing is claimed.
     if not ups or not (ceilings or min(ups) < 0.0):
         return 0.0
@@ -76,19 +88,22 @@ def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float
     return max(_solve_balance(points[carrying], signs[carrying], centroid + off) for off in offs)
 
 
-def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
-    """`imbalance` if some pieces are not boxes: six equations, the largest over centres of mass `at`, (k, 3)."""
+def _measure_general_imbalance(
+    known: ContactMeasurements, operation: Operation, poses: Poses, at: Array, ceilings: bool
+) -> float:
+    """`measure_imbalance` if some pieces are not boxes: six equations, the largest over centres of mass `at`, (k,
+    3)."""
     from scipy.optimize import nnls
 
     lies = known.measure((contact, poses) for contact in operation.contacts)
-    pushing = [pushes(known.assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
+    pushing = [list_pushes(known.assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     # Normals that cannot carry the weight, or no ceiling to leave out: nothing is claimed.
-    if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
+    if not len(normals) or nnls(normals.T, _UP)[1] > _RESIDUAL or not (ceilings or normals[:, 2].min() < -_RESIDUAL):
         return 0.0
-    points, forces = with_friction(pushing)
+    points, forces = add_friction(pushing)
     # all forces, or without ceilings only those that do not push down
-    carrying = forces[:, 2] > (-np.inf if ceilings else -_LEFT)
+    carrying = forces[:, 2] > (-np.inf if ceilings else -_RESIDUAL)
     if not carrying.any():  # nothing supports the part: the whole weight is unbalanced
         return 1.0
     points = points[carrying]
@@ -98,7 +113,9 @@ def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, 
     return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
 
-def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:
+def _list_vertical_forces(
+    known: ContactMeasurements, operation: Operation, poses: Poses
+) -> tuple[Array, Array, list[float]]:
     """The points at which vertical forces may act, and their directions.
 
     Returns:
@@ -113,7 +130,7 @@ def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array,
     return points, np.repeat(ups, [len(each.corners) for each in common]), ups
 
 
-def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
+def _compute_centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
     """Centre of mass of all moved parts, (3,), world frame, [m]; parts are homogeneous, with equal density."""
     volumes = np.array([assembly.solids[part].volume for part in operation.moves])
     centroids = [pose.apply(poses[part], assembly.solids[part].centroid[None])[0] for part in operation.moves]
@@ -147,7 +164,7 @@ class Pushes(NamedTuple):
     """Directions of possible forces, (n, 3), also if the faces do not meet."""
 
 
-def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
+def add_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     """Points and forces, (k, 3) each: forces along normals, and four edges of the friction cone of each support."""
     every = list(pushing)
     points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))  # fields 0 and 1: points, forces
@@ -162,11 +179,11 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     return np.concatenate([points, *[held] * 4]), np.concatenate([n, *(m + side for side in sides)])
 
 
-def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> Pushes:
+def list_pushes(assembly: Assembly, contact: Contact, lie: OverlapOrMate, poses: Poses) -> Pushes:
     """The forces with which the resting part of a contact can push the moved one.
 
     Args:
-        lie: The contact as measured by `Meetings`.
+        lie: The contact as measured by `ContactMeasurements`.
     """
     m, e = contact
     nothing = np.zeros((0, 3))
@@ -182,25 +199,25 @@ def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> 
     if isinstance(rests, Face):
         assert isinstance(moved, RoundFace)
         # A shaft rests on a plane: the force acts on its surface, one radius below the axis.
-        return _along(T_rests[:3, :3] @ rests.normal, at, -moved.radius)
+        return _axial_forces(T_rests[:3, :3] @ rests.normal, at, -moved.radius)
     if isinstance(moved, Face):
         # A plane rests on a shaft: the force acts one radius above the axis.
-        return _along(-T[:3, :3] @ moved.normal, at, rests.radius)
+        return _axial_forces(-T[:3, :3] @ moved.normal, at, rests.radius)
     assert isinstance(moved, RoundFace)
-    around, forces = _around(rests, lie.axis, lie.sine)
+    around, forces = _radial_directions(rests, lie.axis, lie.sine)
     return Pushes(
-        (at[:, None] + _radii(moved, T, rests, T_rests, at)[:, None, None] * around).reshape(-1, 3),
+        (at[:, None] + _wall_radii(moved, T, rests, T_rests, at)[:, None, None] * around).reshape(-1, 3),
         np.tile(forces, (len(at), 1)),
         forces,
     )
 
 
-def _along(n: Array, at: Array, out: float) -> Pushes:
+def _axial_forces(n: Array, at: Array, out: float) -> Pushes:
     """Unit forces along n, (3,), at points of an axis, (k, 3), moved by `out` [m] along n."""
     return Pushes(at + out * n, np.repeat(n[None], len(at), axis=0), n[None])
 
 
-def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
+def _radial_directions(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
     """Directions from the axis to a round wall at 8 angles, and the directions in which the wall pushes, (8, 3) each.
 
     Args:
@@ -213,7 +230,7 @@ def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
     return around, sign * (np.sqrt(1.0 - sine**2) * around - sine * axis)
 
 
-def _radii(moved: RoundFace, T: Array, rests: RoundFace, T_rests: Array, at: Array) -> Array:
+def _wall_radii(moved: RoundFace, T: Array, rests: RoundFace, T_rests: Array, at: Array) -> Array:
     """The radius of the wall at points `at` of its axis, (k,), [m]."""
     if rests.kind == "rim" or moved.kind == "rim":
         return np.full(len(at), rests.radius if rests.kind == "rim" else moved.radius)

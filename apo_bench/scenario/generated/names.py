@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.errors import InputError, require_known
 from apo_bench.scenario.generated.assembly import GeneratedAssembly
 from apo_bench.scenario.generated.families import FAMILIES
-from apo_bench.scenario.generated.laying import lay
+from apo_bench.scenario.generated.table_layout import lay
 from apo_bench.scenario.generated.writing import write
 
 _PREFIX = "generated:"

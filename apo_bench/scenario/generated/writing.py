@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.io import format_toml, write_file
 from apo_bench.scenario.generated.assembly import DrawnOperation, GeneratedAssembly
-from apo_bench.scenario.generated.laying import TableLayout
+from apo_bench.scenario.generated.table_layout import TableLayout
 from apo_bench.scenario.parts.making import Body, write_part
 
 _DENSITY = 700.0

@@ -6,11 +6,11 @@ from pathlib import Path
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Box, Face, Solid
 from apo_bench.resources import folder
-from apo_bench.scenario.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
-from apo_bench.scenario.parts.checking import check_part
-from apo_bench.scenario.parts.faces import SIDES, UnnamedFace, unite
+from apo_bench.scenario.parts.box_union import SIDES, UnnamedFace, unite
+from apo_bench.scenario.parts.limits import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
+from apo_bench.scenario.parts.mass_checks import check_part
 from apo_bench.scenario.parts.part_file import NamedSite, PartFile, read_part
-from apo_bench.scenario.parts.stated import StatedPart
+from apo_bench.scenario.parts.stated_properties import StatedPart
 
 _ON_FACE_M = 1e-6
 """A site lies on a face if it is nearer to its plane and farther from its edges than this."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, make_cylinder_hull
-from apo_bench.scenario.parts.allowed import (
+from apo_bench.scenario.parts.limits import (
     DENSITY,
     LARGEST_M,
     MOST_PIECES,
@@ -19,7 +19,7 @@ from apo_bench.scenario.parts.allowed import (
     is_name,
 )
 from apo_bench.scenario.parts.meshes import make_hull
-from apo_bench.scenario.parts.stated import StatedPart, read_stated_part
+from apo_bench.scenario.parts.stated_properties import StatedPart, read_stated_part
 
 if TYPE_CHECKING:
     from apo_bench.mjcf.part_file import PartGeom, PartModel

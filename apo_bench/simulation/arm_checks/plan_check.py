@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
-from apo_bench.planning.prediction.measures import ArmMove, Refused
+from apo_bench.planning.prediction.plan_measures import ArmMove, Refused
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
@@ -62,12 +62,12 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     if scene.arm.hand is None:  # without a gripper file only reach is predicted
         return ArmMove(step.operation, step.undo)
     T_tip = scene.kinematics.forward(path[-1])  # at the goal
-    depth, struck = struck_by(scene, t, estimated, after)
+    depth, collides_with = find_gripper_overlap(scene, t, estimated, after)
     return ArmMove(
         operation=step.operation,
         undo=step.undo,
-        struck=struck,
-        struck_mm=1e3 * depth,
+        collides_with=collides_with,
+        collision_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
         beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),
         margin_deg=float(np.degrees(np.min(list(map(scene.kinematics.limit_margins, path))))),
@@ -81,15 +81,15 @@ def _at_limit(scene: Scene, q: Array) -> str:
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
 
 
-def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tuple[float, str]:
+def find_gripper_overlap(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tuple[float, str]:
     """The largest penetration of the open gripper into a part at grasp or release, [m], and that part."""
     return max(
-        _deepest_strike(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
-        _deepest_strike(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
+        _deepest_overlap(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
+        _deepest_overlap(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
     )
 
 
-def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
+def _deepest_overlap(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """The largest penetration of the open fingers into a part other than the gripped one, [m], and that part.
 
     (0, "") if the fingers penetrate nothing.

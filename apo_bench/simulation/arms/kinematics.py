@@ -5,6 +5,7 @@ from typing import Any
 import mink
 import mujoco
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.arm import Arm
@@ -101,6 +102,16 @@ class Kinematics:
         self.forward(q)
         return self._jacobian()[:, self.model.jnt_dofadr[self.ids]]
 
+    def gravity_torque(self, q: Array) -> Array:
+        """The torque of each joint that carries the weight of the arm with its hand at rest, (joints,), [N m]."""
+        self.forward(q)
+        data = self.configuration.data
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_comVel(self.model, data)
+        torque = np.zeros(self.model.nv)
+        mujoco.mj_rne(self.model, data, 0, torque)
+        return torque[self.model.jnt_dofadr[self.ids]]
+
     def inverse_jacobian(self, q: Array) -> Array:
         """The pseudoinverse of the Jacobian, (joints, 6): joint rotations, [rad], per twist of the tip, in its frame.
 
@@ -132,16 +143,17 @@ class Kinematics:
         for _ in range(turns):
             mujoco.mj_kinematics(self.model, data)
             error = self._error(T[:3, 3], target)
-            off = error.tolist()
-            if all(abs(x) < self.POSITION_M for x in off[:3]) and all(abs(x) < self.ANGLE_RAD for x in off[3:]):
+            off = [*map(abs, error.tolist())]
+            shift, turn = max(off[:3]), max(off[3:])
+            if shift < self.POSITION_M and turn < self.ANGLE_RAD:
                 return self.last
             step = self._step(error, T)
             if step is None:
                 return None
             longest = float(np.abs(step).max())
             # Five joints: the position is reached and the rotation no longer improves.
-            if self._leans and max(map(abs, off[:3])) < self.POSITION_M and longest < self.ANGLE_RAD:
-                return self.last if max(map(abs, off[3:])) < self.LEAN_RAD else None
+            if self._leans and shift < self.POSITION_M and longest < self.ANGLE_RAD:
+                return self.last if turn < self.LEAN_RAD else None
             # No joint turns by more than half a radian in one step: far from the target the linearisation is wrong.
             mujoco.mj_integratePos(self.model, data.qpos, step, min(1.0, 0.5 / max(longest, 1e-12)))
         return None
@@ -170,7 +182,7 @@ class Kinematics:
             more = self._posture.compute_qp_objective(self.configuration)
             H = H + more[0]
             c = c - more[1]
-        step: Any = np.linalg.solve(H, c)  # violates no limit in most cases, so the programme below is rare
+        step: Any = dgesv(H, c)[2]  # violates no limit in most cases, so the programme below is rare
         low, high = self.GAIN * (self._range - self.configuration.data.qpos)
         if (step >= low).all() and (step <= high).all():
             return step

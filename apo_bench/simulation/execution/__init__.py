@@ -5,13 +5,8 @@ from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionCo
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.execution import Execution
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M, check_hold, depart, release
-from apo_bench.simulation.execution.grasping import (
-    RestingPart,
-    Stroke,
-    find_clear_grasp,
-    list_obstacles,
-    make_tip_frame,
-)
+from apo_bench.simulation.execution.grasp_clearance import RestingPart, Stroke, find_clear_grasp, list_obstacles
+from apo_bench.simulation.execution.grasp_frame import make_tip_frame
 from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState, restore_state, save_state

@@ -2,6 +2,7 @@
 
 Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers. The macros of
 the plan become guarded motions where contacts close, and position-controlled ones along contacts that stay closed.
+The file is long because the motions follow each other: it reads from top to bottom as the robot moves.
 """
 
 import math
@@ -222,6 +223,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.follow(smooth_trajectory(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
+    robot.level()
     robot.slip_monitor = robot.slip_monitor.carry(robot.in_hand())
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:

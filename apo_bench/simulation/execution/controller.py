@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Outcome, Plan, Poses, ReachedState, ReplayResult, Snapshot, list_poses_in_force
-from apo_bench.planning.prediction.stability import first_unstable
+from apo_bench.assembly import Outcome, Plan, Poses, ReachedState, ReplayResult, Snapshot, list_poses_between_undos
+from apo_bench.planning.prediction.stability import find_first_unstable
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
 from apo_bench.simulation.execution.execution import Execution, failed_outcome, moves_with_error
 from apo_bench.simulation.execution.prepare import Move, solve_key_angles
@@ -84,8 +84,8 @@ def replay(
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """Return the outcome of a plan that fails before anything moves: unstable or out of reach; None if it is fine."""
     # Before each undo and at the end, the parts placed so far must stand stably at their targets.
-    for upto, goals in list_poses_in_force(plan):
-        k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
+    for upto, goals in list_poses_between_undos(plan):
+        k = find_first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return failed_outcome(plan, "plan", "unstable_goal", k)
     for step, transfer in todo:

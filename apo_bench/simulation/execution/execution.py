@@ -30,7 +30,7 @@ def moves_with_error(plan: Plan, scene: Scene, config: ExecutionConfig, error: R
     if error is None:
         return plan_moves(plan, scene, config.searches, config.actions)
     planned = plan_moves(error.plan(plan), scene, config.searches, config.actions)
-    return tuple(Move(step, transfer.with_tip_at(error.tool)) for step, transfer in planned)
+    return tuple(Move(step, transfer.with_tip_at(error.pads)) for step, transfer in planned)
 
 
 def failed_outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
@@ -141,6 +141,7 @@ class Execution:
     def _begin(self, todo: tuple[Move, ...]) -> tuple[Move, ...]:
         """Stand still, and probe if configured; return the moves, planned again by the updated calibration."""
         self.robot.wait(_AT_FIRST_S)
+        self.robot.level()
         if self.probing is None:
             return todo
         probe_fixed_parts(self.robot, self.probing)

@@ -44,6 +44,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
         robot.follow(smooth_trajectory(robot.T, above, _NEAR))
     robot.follow(smooth_trajectory(robot.T, at, _NEAR))
     robot.stand()
+    robot.level()
     robot.forces.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
         weld(robot.scene, robot.data, t.part, True)

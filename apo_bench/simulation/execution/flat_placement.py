@@ -21,7 +21,8 @@ from apo_bench.geometry import (
     pose,
 )
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles, upwards
+from apo_bench.simulation.execution.grasp_clearance import gripper_depth, list_obstacles
+from apo_bench.simulation.execution.grasp_frame import upwards
 from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.robot import translate
 from apo_bench.simulation.scene import Scene

@@ -5,19 +5,11 @@ from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, shrink_pieces
-from apo_bench.planning.insertion.surroundings import later_walls, own_walls
+from apo_bench.planning.insertion.insertion_geometry import list_later_walls, list_walls_of_operation
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.grasping import (
-    Grips,
-    RestingPart,
-    Stroke,
-    clear_across,
-    grasp_at,
-    grips_along,
-    half_width,
-    list_obstacles,
-    make_tip_frame,
-)
+from apo_bench.simulation.execution.grasp_clearance import RestingPart, Stroke, list_obstacles
+from apo_bench.simulation.execution.grasp_frame import half_width, make_tip_frame
+from apo_bench.simulation.execution.grasping import Grips, clear_across, grasp_at, grips_along
 from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
 from apo_bench.simulation.robot import measure_turn
 from apo_bench.simulation.scene import Scene
@@ -90,7 +82,7 @@ def centring_grips(
     part = assembly.operations[k].main
     sides = [macro.direction for macro in macros if macro.name == "slide-to-contact"]
     place = RestingPart(after[part], list_obstacles(assembly.solids, after, (part,)))
-    grasps = _across_walls(scene, part, grip, later_walls(assembly, k, part), place, sides)
+    grasps = _across_walls(scene, part, grip, list_later_walls(assembly, k, part), place, sides)
     return tuple(_grip(scene, part, grasp, place.T, place.T) for grasp in grasps)
 
 
@@ -107,7 +99,7 @@ def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimat
     part = assembly.operations[k].main
     T = estimated[part]
     place = RestingPart(T, list_obstacles(assembly.solids, estimated, (part,)))
-    walls = [*own_walls(assembly, k, part), *later_walls(assembly, k, part)]
+    walls = [*list_walls_of_operation(assembly, k, part), *list_later_walls(assembly, k, part)]
     pieces = shrink_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
     rest = scene.kinematics.forward(scene.arm.home)
     turned = []

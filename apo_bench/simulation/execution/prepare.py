@@ -10,14 +10,14 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Plan, Poses, Step
 from apo_bench.geometry import Array, measure_extent, pose, remember
-from apo_bench.planning.insertion.surroundings import (
+from apo_bench.planning.insertion.insertion_geometry import (
     OVER_M,
     WALL_MARGIN_M,
-    ends_of,
-    mouths,
-    neighbours,
-    slide_directions,
-    slow_before,
+    list_entrance_distances,
+    list_neighbours,
+    list_slide_directions,
+    measure_clearing_heights,
+    measure_slow_stretch,
 )
 from apo_bench.scenario.attach_lines import list_nominal_operations
 from apo_bench.simulation.arms.arm import Arm
@@ -152,17 +152,17 @@ def _transfer(
     out = plan_arrival_line(leaves, start)
     preferred = scene.scenario.grasps[k if was is None or not out.level else was]
     grips, out, into = transfer_grips(scene, part, preferred, out, into, estimated, after)
-    macros = motions(comes, target, slide_directions(assembly, comes, after))
-    top, bottom = ends_of(assembly, operation.moves, estimated)
+    macros = motions(comes, target, list_slide_directions(assembly, comes, after))
+    top, bottom = measure_clearing_heights(assembly, operation.moves, estimated)
     # Height of the tip over the lowest point of the moved parts.
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
-    ways = mouths(assembly, comes, after, into.direction)
+    ways = list_entrance_distances(assembly, comes, after, into.direction)
     # A hand that does not hold firmly is slow from the first entrance on.
     first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
-    near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
+    near = [weight[p] for p in list_neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
         part=part,
         carried=operation.carries,
@@ -172,11 +172,11 @@ def _transfer(
         centring=() if undo or into.level else centring_grips(assembly, scene, k, grips[-1], macros, after),
         out=out,
         into=into,
-        departs=departure_motions(leaves, start, slide_directions(assembly, leaves, estimated)),
+        departs=departure_motions(leaves, start, list_slide_directions(assembly, leaves, estimated)),
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
-        slow=max(slow_before(assembly, comes, after, into.direction), first + WALL_MARGIN_M),
+        slow=max(measure_slow_stretch(assembly, comes, after, into.direction), first + WALL_MARGIN_M),
         entrances=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,

@@ -14,7 +14,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, Face, measure_extent, measure_intrusion_depths, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles
+from apo_bench.simulation.execution.grasp_clearance import gripper_depth, list_obstacles
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, measure_turn, move_to_height

@@ -8,9 +8,9 @@ import numpy as np
 from apo_bench.assembly import Operation, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.arrival import Arrival
-from apo_bench.planning.insertion.attach import Attach
+from apo_bench.planning.insertion.attach_line import Attach
+from apo_bench.planning.insertion.insertion_geometry import WALL_MARGIN_M
 from apo_bench.planning.insertion.macros import MacroName
-from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot import move_to_height, translate
 
 _AHEAD_M = 0.01
@@ -235,10 +235,10 @@ def motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motio
     """Return the macros of an arrival at T with their directions in the world: first all others, then the slides.
 
     Args:
-        sides: Directions of the slides, (3,) each, world, from `slide_directions`.
+        sides: Directions of the slides, (3,) each, world, from `list_slide_directions`.
     """
     straight = [macro for macro in arrival.macros if macro.name != "slide-to-contact"]
-    turned = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in straight]
+    turned = [Motion(macro.name, T[:3, :3] @ arrival.to_part_frame(macro.direction)) for macro in straight]
     return (*turned, *(Motion("slide-to-contact", side) for side in sides))
 
 
@@ -246,8 +246,8 @@ def departure_motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> t
     """Return the motions by which a part leaves T: off its sides in the reverse order, then out of enclosing walls.
 
     Args:
-        sides: Directions of the slides, (3,) each, world, from `slide_directions`.
+        sides: Directions of the slides, (3,) each, world, from `list_slide_directions`.
     """
     out = [macro for macro in arrival.departs if macro.length_m is not None]
-    drawn = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in out]
+    drawn = [Motion(macro.name, T[:3, :3] @ arrival.to_part_frame(macro.direction)) for macro in out]
     return (*(Motion("depart", -side) for side in reversed(sides)), *drawn)

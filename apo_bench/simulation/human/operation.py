@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array
 from apo_bench.planning.insertion.arrival import Arrival
-from apo_bench.planning.insertion.surroundings import OVER_M, ends_of, slide_directions
+from apo_bench.planning.insertion.insertion_geometry import OVER_M, list_slide_directions, measure_clearing_heights
 from apo_bench.scenario import (
     Scenario,
     list_nominal_operations,
@@ -66,8 +66,8 @@ def plan_hand_operation(
     nominal = list_nominal_operations(scenario)[k]
     direction = target[:3, :3] @ nominal.after.line.direction
     on_floor = any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in nominal.after.touched)
-    top, bottom = ends_of(assembly, operation.moves, stages[k])
-    beside = _off(slide_directions(assembly, nominal.after, stages[k + 1]))
+    top, bottom = measure_clearing_heights(assembly, operation.moves, stages[k])
+    beside = _off(list_slide_directions(assembly, nominal.after, stages[k + 1]))
     return HandOperation(
         part=operation.main,
         carries=operation.carries,
@@ -89,7 +89,7 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     direction = poses[before.main][:3, :3] @ before.line.direction
     if before.touched and abs(direction[2]) < 0.5:
         return np.asarray(-before.line.travel_m * direction)
-    return _SIDE_M * _off(slide_directions(assembly, before, poses))
+    return _SIDE_M * _off(list_slide_directions(assembly, before, poses))
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

@@ -1,6 +1,6 @@
 """The simulated robot: its motions along lines, its force sensors, its gripper and its errors."""
 
-from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, servo, zero
+from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, servo, zero, zero_again
 from apo_bench.simulation.robot.forces import Guard, LowPass
 from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
@@ -18,6 +18,7 @@ from apo_bench.simulation.robot.paths import (
 from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints, solve_end_angles
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.sag import compute_sag_per_metre
 from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import (
     BANDWIDTH_HZ,
@@ -45,6 +46,7 @@ __all__ = (
     "comply",
     "compute_low_pass_gain",
     "compute_part_loads",
+    "compute_sag_per_metre",
     "filter_noise",
     "find_near_spans",
     "follow_waypoints",
@@ -66,4 +68,5 @@ __all__ = (
     "translate",
     "weld",
     "zero",
+    "zero_again",
 )

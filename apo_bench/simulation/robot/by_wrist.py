@@ -59,7 +59,8 @@ def get_wrist(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: f
     Raises:
         InputError: An unknown name, or a number that is not allowed.
     """
-    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, parse_ft_noise(name), rng, bandwidth_hz)
+    noise = parse_ft_noise(name)
+    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, noise, rng, bandwidth_hz, robot.ft_drift)
 
 
 @contextmanager
@@ -93,6 +94,17 @@ def zero(robot: Robot, wrist: WristSensor) -> None:
         wrist.start_zero()
         robot.wait(ZERO_S)
         wrist.end_zero()
+
+
+def zero_again(robot: Robot, wrist: WristSensor) -> None:
+    """Tare the wrist sensor before a guarded motion if it has drifted; the arm stands still in free air.
+
+    Raises:
+        ExecutionAborted: Something went wrong meanwhile.
+    """
+    with read_wrist(robot, wrist):
+        if wrist.is_off:
+            zero(robot, wrist)
 
 
 def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist: WristSensor) -> float | None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ _COLLISION_N = 20.0
 
 
 class LowPass:
-    """A first-order low pass of a force, dy/dt = (x - y) / time constant; plain floats, since small arrays are slow."""
+    """A first-order low pass of a force, dy/dt = (x - y) / time constant."""
 
     def __init__(self, time_constant_s: float) -> None:
         self._time_constant_s = time_constant_s
@@ -28,6 +29,8 @@ class LowPass:
 
     def __call__(self, force: Sequence[float], seconds: float) -> list[float]:
         """Filter a force that acted for some time; return the filtered force, (3,), [N].
+
+        It computes with plain floats, since small arrays are slow.
 
         Args:
             force: Mean force during this time, (3,), [N].
@@ -38,6 +41,30 @@ class LowPass:
         fx, fy, fz = force
         self.force = [x + (fx - x) * part, y + (fy - y) * part, z + (fz - z) * part]
         return self.force
+
+    def filter_steps(self, forces: Array, step_s: float) -> Array:
+        """Filter the forces of several steps; return the filtered force after each, (k, 3), [N].
+
+        Args:
+            forces: Mean force during each step, (k, 3), [N].
+            step_s: Length of a step, at most the time constant.
+        """
+        decay, weights = _step_weights(len(forces), step_s / self._time_constant_s)
+        filtered = decay * self.force + weights @ forces
+        self.force = filtered[-1].tolist()
+        return np.asarray(filtered)
+
+
+@lru_cache(maxsize=256)
+def _step_weights(k: int, part: float) -> tuple[Array, Array]:
+    """Return the weights of a low pass over k steps: of its state before, (k, 1), and of the forces, (k, k).
+
+    Args:
+        part: Length of a step over the time constant.
+    """
+    kept: Array = np.power(1.0 - part, np.arange(k + 1.0))  # share of a force that is left after so many steps
+    steps = np.arange(k)
+    return kept[1:, None], np.tril(part * kept[steps[:, None] - steps])
 
 
 class Guard(NamedTuple):
@@ -68,6 +95,8 @@ class ForceSensors:
         self._on_arm = self._on_arm_flat.reshape(-1, 3)
         self._net_of_sensors = np.zeros((3, len(contacts)))  # contact sensors -> net force on the held parts
         self._handled: int | None = None  # index of the part that the fingers may touch
+        self.needed: list[int] = []
+        """The sensors that `net` and `push` read, by their number."""
         self.held: tuple[str, ...] = ()
         """The held part, then the parts that it carries."""
         self.wrist = LowPass(WRIST_S)
@@ -82,10 +111,12 @@ class ForceSensors:
         # Force on a part = -(its own sensor) - (force of the arm on it), and the latter is -(force of it on the arm).
         # Forces between the parts of a group cancel in the sum over the group.
         self._net_of_sensors = np.zeros_like(self._net_of_sensors)
-        for i in map(self._free.index, parts):
-            on_arm = 3 * (len(self._free) + i)
-            self._net_of_sensors[:, on_arm : on_arm + 3] += np.eye(3)
-            self._net_of_sensors[:, 3 * i : 3 * i + 3] -= np.eye(3)
+        own = [*map(self._free.index, parts)]
+        on_arm = [len(self._free) + i for i in own]
+        self.needed = [*own, *on_arm]
+        by_sensor = self._net_of_sensors.reshape(3, -1, 3)
+        by_sensor[:, on_arm] += np.eye(3)[:, None]
+        by_sensor[:, own] -= np.eye(3)[:, None]
 
     def handle(self, part: str | None) -> None:
         """Set the part that the fingers may touch without a collision; None: no part."""
@@ -95,6 +126,10 @@ class ForceSensors:
         """Return the net contact force on the held parts, except that of the gripper, (3,), world, [N]."""
         net: list[float] = np.dot(self._net_of_sensors, self.sensors).tolist()
         return net
+
+    def external_n(self) -> float:
+        """Return the contact force on the held parts, or on the arm with an empty hand, [N]."""
+        return math.hypot(*self.net()) if self.held else float(np.linalg.norm(self._on_arm_flat))
 
     def push(self, guard: Guard) -> Array:
         """Return the weights, (sensors,), whose dot product with `sensors` is the force against a guard, [N]."""
@@ -107,14 +142,24 @@ class ForceSensors:
             sensors: Contact sensors after each step, (k, sensors).
             step_s: Length of a step, [s].
         """
-        for force in (sensors @ self._net_of_sensors.T).tolist():
-            self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
+        x, y, z = self.wrist.filter_steps(sensors @ self._net_of_sensors.T, step_s).T
+        self.peak_n = max(self.peak_n, float(np.hypot(np.hypot(x, y), z).max()))
+
+    def take_step(self, step_s: float) -> list[float]:
+        """Filter the net force of the last physics step and update the peak; return the net force, (3,), [N].
+
+        Args:
+            step_s: Length of the step, [s].
+        """
+        force = self.net()
+        self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
+        return force
 
     def load(self) -> float:
         """Return the weight on the gripper, [N]: of the held part and of everything that really hangs on it."""
         return -float(self._on_arm[:, 2].sum())  # vertical forces; parts push the arm down
 
-    def struck(self) -> str | None:
+    def find_collision(self) -> str | None:
         """Return the part with which the arm collides harder than `_COLLISION_N`, None if there is none.
 
         The part that is handled does not count.

@@ -10,14 +10,15 @@ Friction, the force and stiffness of the fingers and the softness of friction ch
 the speed halves it. Half the time constant of the pads does too, but then misplaced parts slip into place.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.frames import body_frame, quaternion
-from apo_bench.simulation.scene import Scene, World, get_part_pose, set_part_pose, touches_others
+from apo_bench.simulation.frames import body_frame, cross, quaternion
+from apo_bench.simulation.scene import Scene, World, get_part_pose, move_part, touches_others
 
 SLIPS_M = 5e-5
 """Displacement in the hand within a tick above which a part slips, and is not put back."""
@@ -49,12 +50,10 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
     now = get_part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
         wanted = T_world_tip @ carried.T_tip_part
-        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:  # creep; else the new pose is kept from now on
+        if math.dist(wanted[:3, 3], now[:3, 3]) <= SLIPS_M:  # creep; else the new pose is kept from now on
             shift = wanted @ pose.inverse(now)
-            velocity = np.array(data.qvel)  # `set_part_pose` stops a part
             for part in carried.parts:
-                set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
-            data.qvel[:] = velocity
+                move_part(world, data, part, shift @ get_part_pose(world, data, part))
             return carried
     return carried._replace(T_tip_part=pose.inverse(T_world_tip) @ now)
 
@@ -102,10 +101,10 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
     spin = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
     for part in held:
         T = way @ get_part_pose(world, data, part)
-        set_part_pose(world, data, part, T)
+        move_part(world, data, part, T)
         v = world.dof[part]
         # v = v_frame + spin x lever; MuJoCo has the spin of a free body in the frame of the body.
-        data.qvel[v : v + 3] = speed + np.cross(spin, T[:3, 3] - after[:3, 3])
+        data.qvel[v : v + 3] = speed + cross(spin, T[:3, 3] - after[:3, 3])
         data.qvel[v + 3 : v + 6] = T[:3, :3].T @ spin
 
 

@@ -5,6 +5,7 @@ the simulation; no command of the robot depends on it. Distances are along separ
 distance, so no near stretch is missed.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -132,7 +133,7 @@ def _near(
     start = line.start[:3, 3]
     tips = start + s[:, None] * (line.end[:3, 3] - start)
     near = np.zeros(len(s), dtype=np.bool_)
-    turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
+    turns = math.hypot(*line.turn) > _UPRIGHT
     bounds = np.array([(each.low, each.high) for each in obstacles])
     for pieces, T_tip in moving:
         low, high = measure_upright_bounds(pieces, R @ T_tip[:3, :3], R @ T_tip[:3, 3])

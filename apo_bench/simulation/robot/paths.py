@@ -1,5 +1,6 @@
 """Straight-line trajectories of the tip, with smooth, steady and paced timing, and waypoints for the wrist."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,6 +9,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, pose
+from apo_bench.simulation.frames import rotation_vector
 
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
@@ -17,8 +19,6 @@ _RAMP_S = 0.1
 """Duration of the acceleration, and of the deceleration, of a steady motion."""
 _GAIN = 0.6  # acceleration and deceleration of a paced motion, [m/s^2]
 _CELL_M = 2e-5  # spacing at which the speed of a paced motion is computed
-_STRAIGHT = 1e-8
-"""A rotation matrix this near to the identity has its antisymmetric part as rotation vector, which saves time."""
 
 
 @final
@@ -48,8 +48,10 @@ class Trajectory:
     def poses(self, s: Array) -> Array:
         """Return the poses, (k, 4, 4), at fractions of the way, (k,)."""
         T = np.zeros((len(s), 4, 4))
-        turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
-        T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
+        T[:, :3, :3] = self.start[:3, :3]
+        if self.turn.any():
+            turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
+            T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * (self.end[:3, 3] - self.start[:3, 3])
         T[:, 3, 3] = 1.0
         return T
@@ -57,12 +59,12 @@ class Trajectory:
 
 def distance(start: Array, end: Array) -> float:
     """Return the distance between the positions of two poses, [m]."""
-    return float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    return math.dist(start[:3, 3], end[:3, 3])
 
 
 def smooth_trajectory(start: Array, end: Array, speed: float, turn_speed: float = 1.5) -> Trajectory:
     """Return a minimum-jerk trajectory, at rest at both ends, with bounded peak speeds [m/s] and [rad/s]."""
-    turn = float(np.linalg.norm(_turn_between(start, end)))
+    turn = math.hypot(*_turn_between(start, end))
     seconds = max(_SHORTEST_S, _PEAK * distance(start, end) / speed, _PEAK * turn / turn_speed)
     return Trajectory(start, end, seconds, interpolate_minimum_jerk)
 
@@ -136,12 +138,7 @@ class _Table:
 
 def _turn_between(start: Array, end: Array) -> Array:
     """Return the rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
-    R = start[:3, :3].T @ end[:3, :3]
-    if np.abs(R - np.eye(3)).max() < _STRAIGHT:
-        return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    T = np.eye(4)
-    T[:3, :3] = R
-    return pose.log(T)[3:]
+    return rotation_vector(start[:3, :3].T @ end[:3, :3])
 
 
 def measure_turn(rest: Array, T: Array) -> float:

@@ -1,7 +1,9 @@
 """Joint angles along a straight line of the tip: inverse kinematics at knots, and a cubic spline through them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -28,9 +30,26 @@ class Knots(NamedTuple):
     """Joint angles from inverse kinematics at places along a line."""
 
     s: Array
-    """Fractions of the line, (k,), from 0 to 1."""
+    """Fractions of the line, (k,), in equal steps."""
     q: Array
     """Joint angles there, (k, joints), [rad]."""
+
+    def angles(self, t: Array) -> Array:
+        """Return the joint angles of a cubic spline through the knots, (n, joints), [rad].
+
+        Args:
+            t: Fractions of the way from the first knot to the last, (n,), from 0 to 1.
+        """
+        return np.asarray(_basis(len(self.q))(t) @ self.q)
+
+
+@lru_cache(maxsize=64)
+def _basis(k: int) -> CubicSpline:
+    """Return the splines through k equally spaced knots in [0, 1] of which one is 1 and the others are 0, (k,) values.
+
+    A spline through any values at these knots is their sum with the values as weights.
+    """
+    return CubicSpline(np.linspace(0.0, 1.0, k), np.eye(k))
 
 
 def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: Knots | None = None) -> Array | None:
@@ -48,7 +67,7 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
     places = np.linspace(s[0], s[-1], max(least, int(np.ceil(part * _steps(line, _KNOT_M, _KNOT_RAD))) + 1))
     if known is None or not np.array_equal(known.s, places):
         known = _knots(kinematics, line, places, q)
-    return None if known is None else np.asarray(CubicSpline(*known)(s))
+    return None if known is None else known.angles((s - s[0]) / part)
 
 
 def solve_end_angles(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
@@ -136,14 +155,14 @@ def limit_speed(
         return line, None
     t = np.linspace(0.0, 1.0, _SPEED_TIMES)
     # dq/dt = dq/d(t/seconds) / seconds, so a line that takes `ratio` times as long keeps the limit.
-    speed = np.abs(np.gradient(CubicSpline(*knots)(line.progress(t)), t, axis=0)) / line.seconds
+    speed = np.abs(np.gradient(knots.angles(line.progress(t)), t, axis=0)) / line.seconds
     ratio = float((speed / limit).max())
     return (line if ratio <= 1.0 else replace(line, seconds=line.seconds * ratio)), knots
 
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
     """Return how many steps a line takes if none is longer than `far`, [m], or turns more than `turn`, [rad]."""
-    return max(line.length / far, float(np.linalg.norm(line.turn)) / turn)
+    return max(line.length / far, math.hypot(*line.turn) / turn)
 
 
 def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:

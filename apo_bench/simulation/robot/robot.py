@@ -6,6 +6,8 @@ Every physics step of a replay is taken in one of two methods. `_tick` takes tho
 The robot knows its commands, its joint and finger positions and the force on the held part; no command depends on the
 true pose of a part. Only the simulation reads or sets these: `_look` and `slip` shift parts in the hand, `in_hand`
 records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
+
+The file is long because all these methods change one state: the command, the simulation and its time.
 """
 
 import math
@@ -30,16 +32,22 @@ from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene import (
     Scene,
+    compute_only,
     get_part_pose,
     has_failed,
     is_unstable,
     make_initial_state,
-    switch_sensors_off,
     use_timestep,
 )
 
 _REST_RAD_S = 2e-3  # joint speed below which the arm is at rest
 _REST_M_S = 3e-3  # finger speed below which the fingers are at rest
+_LAG_M = 1e-4
+"""Distance of the resting tip from its command above which `level` corrects it; a compensated arm with a part in its
+hand is within 0.02 mm."""
+_PUSHED_N = 0.5  # external force above which contact may hold the arm off its command
+_LEVEL_S = 0.2  # duration of this correction
+_SAG_STEPS = 25  # physics steps between two poses for which the sag of the joints is computed
 
 
 class ExecutionAborted(Exception):
@@ -95,8 +103,12 @@ class Robot:
         self._error = error
         # True minus measured joint angles.
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
+        # Compliance of the joints behind the encoders, [rad/(N m)].
+        self._sag: Array = np.zeros(1) if error is None else error.sag
+        # Commands less measured joint angles at rest, for which the commands compensate.
+        self._droop: Array = np.zeros(len(scene.arm.joints))
         # The search for near parts uses the estimated tip, so with joint errors no step is skipped.
-        self.fidelity = "full" if self._off.any() else fidelity
+        self.fidelity = "full" if self._off.any() or self._sag.any() else fidelity
         self._carried: Carried | None = None
         model = self.model
         joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
@@ -115,11 +127,11 @@ class Robot:
         self.T: Array = scene.kinematics.forward(self.q)
         self._fingers = fingers_of(model, self.arm)
         self.data: Any = make_initial_state(scene.work, start)
-        self.data.qpos[self._qpos] = self.q + self._off
+        self.data.qpos[self._qpos] = self._true(self.q[None])[0]
         self._fingers.put(self.data, self.arm.opening_m)
         self.data.ctrl[:] = 0.0
         mujoco.mj_forward(model, self.data)
-        self.data.ctrl[self._drives] = self.q + self._off
+        self.data.ctrl[self._drives] = self._true(self.q[None])[0]
         self._fingers.command(self.data, self.arm.opening_m)
         self.forces = ForceSensors(scene.work, self.data.sensordata)
 
@@ -195,12 +207,12 @@ class Robot:
             The contact force on the held part, (3,), world, [N].
         """
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
-        self.data.ctrl[self._drives] = to + self._off
+        self.data.ctrl[self._drives] = self._true(to[None])[0] + self._droop
         mujoco.mj_step(self.model, self.data)
-        self.forces.take(self.forces.sensors[None], self.step_s)
+        force = self.forces.take_step(self.step_s)
         if passed % self._steps_of_tick == 0:
             self._look()
-        return self.forces.net()
+        return force
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still for some time.
@@ -208,12 +220,12 @@ class Robot:
         Args:
             parts: Number of shorter steps into which each physics step is divided.
         """
-        command = self._commands(self.q[None])
+        self.data.ctrl[self._drives] = self.q + self._off
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._steps_of_tick):
             n = min(self._steps_of_tick, steps - done)
             with use_timestep(self.model, self.step_s / parts):
-                self._tick(np.repeat(command, parts * n, axis=0))
+                self._tick(parts * n)
             if n == self._steps_of_tick:
                 self._look()
 
@@ -250,10 +262,30 @@ class Robot:
                 break
         fingers.command(self.data, to)
 
+    def level(self) -> None:
+        """Raise the resting arm to its command if its encoders show that it hangs lower, unless it touches something.
+
+        Servos yield to a weight that is not compensated. From now on the commands include the difference, so that after
+        a guarded stop, too, the arm carries its weight instead of resting it on what it touches.
+        """
+        lag = self.q - self.encoders()
+        off = self.scene.kinematics.forward(self.q - lag)[:3, 3] - self.T[:3, 3]
+        hangs = self._droop.any() or np.linalg.norm(off) > _LAG_M
+        if not hangs or self.forces.external_n() > _PUSHED_N:
+            return
+        steps = round(_LEVEL_S / self.step_s)
+        self._run(self.q + np.linspace(0.0, 1.0, steps)[:, None] * lag, None)
+        self._droop = self._droop + lag
+        self.stand()
+
     def _rests(self) -> bool:
         """Whether the joints and the fingers are at rest."""
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
+
+    def ft_drift(self) -> Array:
+        """Return how far the force-torque sensor has drifted by now, (6,) or (1,) if it does not, [N] and [Nm]."""
+        return np.zeros(1) if self._error is None else self._error.ft_drift * self.data.time
 
     def opening(self) -> float:
         """Return the measured opening of each finger, [m]."""
@@ -261,7 +293,10 @@ class Robot:
 
     def encoders(self) -> Array:
         """Return the measured joint angles, (joints,), [rad]; they contain the joint errors."""
-        return np.asarray(self.data.qpos[self._qpos] - self._off)
+        measured = self.data.qpos[self._qpos] - self._off
+        if self._sag.any():
+            measured = measured + self._sag * self.scene.kinematics.gravity_torque(measured)
+        return np.asarray(measured)
 
     def tip(self) -> Array:
         """Return the pose of the tip by the true joint angles, (4, 4), world."""
@@ -269,11 +304,11 @@ class Robot:
 
     def memory(self) -> tuple[Any, ...]:
         """Return the state of the controller, without that of the physics, for `remember`."""
-        return self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
+        return self.q, self.T, self._droop, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
 
     def remember(self, memory: tuple[Any, ...]) -> None:
         """Restore the state that `memory` returned; the caller restores that of the physics."""
-        self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, forces = memory
+        self.q, self.T, self._droop, self.stage, self.left_out_s, self.slip_monitor, forces = memory
         self.forces.remember(forces)
 
     def in_hand(self) -> Array:
@@ -292,10 +327,11 @@ class Robot:
             mujoco.mj_forward(self.model, self.data)
             weld(self.scene, self.data, held[0], True)
 
-    def compensate(self, off: Array) -> None:
-        """Replace the joint errors, (joints,), [rad]: true minus measured angles, after calibration."""
+    def compensate(self, off: Array, sag: Array) -> None:
+        """Replace the joint errors, (joints,), [rad]: true minus measured angles, and the sag, after calibration."""
         self._off = off
-        if off.any():
+        self._sag = sag
+        if off.any() or sag.any():
             self.fidelity = "full"
 
     def steady(self, on: bool) -> None:
@@ -334,8 +370,18 @@ class Robot:
         The joint errors are added, since MuJoCo's servos act on true angles. The fingers keep their command.
         """
         commands = np.repeat(self.data.ctrl[None], len(targets), axis=0)
-        commands[:, self._drives] = targets + self._off
+        commands[:, self._drives] = self._true(targets) + self._droop
         return commands
+
+    def _true(self, q: Array) -> Array:
+        """Return the true joint angles at measured ones, (n, joints) at successive physics steps, [rad]."""
+        if not self._sag.any():
+            return np.asarray(q + self._off)
+        n = len(q)
+        at = np.unique(np.append(np.arange(0, n, _SAG_STEPS), n - 1))
+        torque = np.array([self.scene.kinematics.gravity_torque(q[i]) for i in at])
+        between = [np.interp(np.arange(n), at, of_joint) for of_joint in torque.T]
+        return np.asarray(q + self._off - self._sag * np.transpose(between))
 
     def _run(self, targets: Array, guard: Guard | None) -> int:
         """Command joint targets, (n, joints), one for each physics step, until a guard stops the motion.
@@ -346,18 +392,21 @@ class Robot:
         commands = self._commands(targets)
         for done in range(0, len(commands), self._steps_of_tick):
             tick = commands[done : done + self._steps_of_tick]
-            stopped = self._tick(tick, guard)
+            stopped = self._tick(len(tick), tick, guard)
             if stopped or len(tick) == self._steps_of_tick:
                 self._look()
             if stopped:
                 return done + stopped
         return len(commands)
 
-    def _tick(self, commands: Array, guard: Guard | None = None) -> int:
-        """Take one physics step for each command, (n, controls), without checking the state between them.
+    def _tick(self, n: int, commands: Array | None = None, guard: Guard | None = None) -> int:
+        """Take n physics steps, without checking the state between them.
 
-        Contact forces are read at each step if a part is held or the wrist sensor is on. With an empty hand they are
-        needed by `_look` only, so MuJoCo computes them in the last step only.
+        The forces on held parts, and those of a wrist sensor that is on, are read at each step. The others are needed
+        by `_look` only, so MuJoCo computes them for the last step only.
+
+        Args:
+            commands: Of all actuators before each step, (n, controls); None: they stay as they are.
 
         Returns:
             After how many steps the guard stopped the motion; 0 if it did not.
@@ -365,30 +414,28 @@ class Robot:
         model = self.model
         data = self.data
         ctrl = data.ctrl
-        if self.wrist is None and not self.forces.held:
-            with switch_sensors_off(model):
-                for command in commands[:-1]:
-                    ctrl[:] = command
-                    mujoco.mj_step(model, data)
-            ctrl[:] = commands[-1]
-            mujoco.mj_step(model, data)
+        if commands is None and self.wrist is None and not self.forces.held:
+            with compute_only(model, data, []):
+                mujoco.mj_step(model, data, n)
             return 0
         step_s = float(model.opt.timestep)
         sensors = self.forces.sensors
-        rows = np.empty((len(commands), len(sensors)))
+        rows = np.empty((n, len(sensors)))
         push = None if guard is None else self.forces.push(guard)
         newton = math.inf if guard is None else guard.newton
         stopped = False
         steps = 0
-        while not stopped and steps < len(commands):
-            ctrl[:] = commands[steps]
-            mujoco.mj_step(model, data)
-            rows[steps] = sensors
-            steps += 1
-            if self.wrist is not None:
-                stopped = self.wrist.take(step_s) and self.wrist.stops(guard)
-            elif push is not None:
-                stopped = bool(sensors.dot(push) > newton)
+        with compute_only(model, data, self.forces.needed if self.wrist is None else slice(None)):
+            while not stopped and steps < n:
+                if commands is not None:
+                    ctrl[:] = commands[steps]
+                mujoco.mj_step(model, data)
+                rows[steps] = sensors
+                steps += 1
+                if self.wrist is not None:
+                    stopped = self.wrist.take(step_s) and self.wrist.stops(guard)
+                elif push is not None:
+                    stopped = bool(sensors.dot(push) > newton)
         self.forces.take(rows[:steps], step_s)
         return steps if stopped else 0
 
@@ -401,8 +448,8 @@ class Robot:
             raise ExecutionAborted(self.stage, "unstable_simulation")
         if self._carried is not None:
             self._carried = hold_steady(self.scene.work, self.data, self.tip(), self._carried)
-        if struck := self.forces.struck():
-            raise ExecutionAborted(self.stage, "collision", struck)
+        if obstacle := self.forces.find_collision():
+            raise ExecutionAborted(self.stage, "collision", obstacle)
         if self.hooks.after_tick is not None:
             macro = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)

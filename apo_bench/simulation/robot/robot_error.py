@@ -4,7 +4,7 @@ They are drawn before the trial. Planners, predictors and correctors know the no
 forces.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -26,6 +26,20 @@ class RobotError:
     """Tool error, (4, 4): pose of the real tip in the frame of the estimated tip."""
     in_hand: Array
     """Slip of the part of each of n operations after it was grasped, (n, 4, 4), in the frame of the tip."""
+    sag: Array = field(default_factory=lambda: np.zeros(1))
+    """Compliance of each joint to the weight of the arm, (joints,) or (1,) if none has any, [rad/(N m)]. The encoders
+    sit before it, so they do not show how far the joints yield."""
+    finger: float | Array = 0.0
+    """Length by which one finger is shorter than the other in the closing direction, along x of the tip, [m]."""
+    ft_drift: Array = field(default_factory=lambda: np.zeros(6))
+    """Drift of the force-torque sensor, (6,), in its own frame, [N/s, Nm/s]."""
+
+    @property
+    def pads(self) -> Array:
+        """The pose of the real middle between the pads in the frame of the estimated tip, (4, 4)."""
+        pads = np.array(self.tool)
+        pads[..., :3, 3] += 0.5 * np.asarray(self.finger)[..., None] * self.tool[..., :3, 0]
+        return pads
 
     def plan(self, plan: Plan) -> Plan:
         """Return the plan with all poses shifted by the hand-eye error, as the robot executes it."""

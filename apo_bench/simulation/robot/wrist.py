@@ -28,6 +28,9 @@ BANDWIDTH_HZ = 16.0
 """Cutoff of the low-pass filter: a time constant of 10 ms, which leaves 0.22 of the noise of a reading."""
 OFFSETS = 20.0
 """Standard deviation of the offset of a sensor before it is zeroed, in standard deviations of its noise."""
+_OFF = (0.3, 0.015)
+"""Least wrench in free air that is no noise, [N] and [Nm]: slip of a part in the hand shifts its weight by less."""
+_OFF_SIGMAS = 6.0  # the same in standard deviations of the filtered noise
 _GRAVITY = 9.81  # [m/s^2]
 _ROUNDING_S = 1e-9  # tolerance for sums of physics steps
 
@@ -80,6 +83,11 @@ def filter_noise(noise: FtNoise, part: float) -> FtNoise:
     return FtNoise(left * noise.force_n, left * noise.torque_nm)
 
 
+def _no_drift() -> Array:
+    """Return the drift of a sensor that does not drift."""
+    return np.zeros(1)
+
+
 @final
 class WristSensor:
     """The sensor at the wrist of one arm during one replay."""
@@ -92,6 +100,7 @@ class WristSensor:
         noise: FtNoise,
         rng: np.random.Generator,
         bandwidth_hz: float = BANDWIDTH_HZ,
+        drift: Callable[[], Array] = _no_drift,
     ) -> None:
         """Draw the offset of the trial.
 
@@ -102,6 +111,7 @@ class WristSensor:
             noise: Standard deviations of a reading, per axis.
             rng: Source of six numbers now and six at each reading.
             bandwidth_hz: Cutoff frequency of the low pass.
+            drift: Returns how far the offset has drifted, (6,), [N] and [Nm].
         """
         first = [int(scene.work.model.sensor_adr[scene.work.model.sensor(name).id]) for name in WRIST_SENSORS]
         self._raw_at = first[0]
@@ -112,6 +122,7 @@ class WristSensor:
         self._rng = rng
         self._part = compute_low_pass_gain(bandwidth_hz)
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
+        self._drift = drift
         self._zero: Array = np.zeros(6)
         data, T_tip = open_hand(scene.kinematics, scene.arm.opening_m)
         mount = body_frame(data, scene.kinematics.model.body(scene.arm.mount).id)
@@ -161,7 +172,8 @@ class WristSensor:
         self._clock_s += step_s
         if self._clock_s < READING_S - _ROUNDING_S:
             return False
-        reading = self._sum / self._summed_s + self._offset + self._sigma * self._rng.standard_normal(6)
+        offset = self._offset + self._drift()
+        reading = self._sum / self._summed_s + offset + self._sigma * self._rng.standard_normal(6)
         self._sum[:] = 0.0
         self._summed_s = 0.0
         self._clock_s -= READING_S
@@ -171,7 +183,7 @@ class WristSensor:
         return True
 
     def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
-        """Return a copy, with the same offset and tare, for another simulation of its robot and other noise.
+        """Return a copy, with the same offset and tare but no drift, for another simulation of its robot.
 
         Args:
             sensordata, encoders, rng: As for the constructor.
@@ -180,8 +192,16 @@ class WristSensor:
         other._raw = sensordata[self._raw_at : self._raw_at + 6]
         other._encoders = encoders
         other._rng = rng
+        other._offset = self._offset + self._drift()
+        other._drift = _no_drift
         other.begin(self._hand)
         return other
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the sensor, in free air, reads more than an external wrench of zero with its noise."""
+        wrench = np.abs(self.wrench_there()).reshape(2, 3).max(axis=1)
+        return bool((wrench > np.maximum(_OFF, _OFF_SIGMAS * np.array(self.sigma))).any())
 
     def start_zero(self) -> None:
         """Start to collect readings for `end_zero`, while the arm stands still in free air."""

@@ -14,7 +14,6 @@ from apo_bench.geometry import Array, Ints
 from apo_bench.simulation.frames import frame, quaternion, rotation
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-_NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 _WHEN_FELT = int(mujoco.mjtStage.mjSTAGE_ACC)  # stage of a step in which a force sensor is computed
 _NEVER = int(mujoco.mjtStage.mjSTAGE_NONE)  # the same, for a sensor that is off
 WRIST_SENSORS = ("wrist_force", "wrist_torque")
@@ -63,11 +62,16 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
 
 def set_part_pose(world: World, data: Any, part: str, T: Array) -> None:
     """Set the pose of a movable part, with zero velocity."""
-    a = world.qpos[part]
+    move_part(world, data, part, T)
     v = world.dof[part]
+    data.qvel[v : v + 6] = 0.0
+
+
+def move_part(world: World, data: Any, part: str, T: Array) -> None:
+    """Set the pose of a movable part; its velocity stays."""
+    a = world.qpos[part]
     data.qpos[a : a + 3] = T[:3, 3]
     data.qpos[a + 3 : a + 7] = quaternion(T)
-    data.qvel[v : v + 6] = 0.0
 
 
 def make_initial_state(world: World, start: Poses) -> Any:
@@ -91,7 +95,7 @@ def get_part_pose(world: World, data: Any, part: str) -> Array:
 
 def has_failed(data: Any) -> bool:
     """Whether MuJoCo has issued a warning, or a position is not finite."""
-    return bool(data.warning.number.any()) or not math.isfinite(data.qpos.sum())
+    return any(data.warning.number.tolist()) or not math.isfinite(data.qpos.sum())
 
 
 def is_unstable(error: Exception, data: Any) -> bool:
@@ -110,9 +114,17 @@ def use_timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
     return _with_option(model, "timestep", seconds)
 
 
-def switch_sensors_off(model: Any) -> AbstractContextManager[None]:
-    """Disable all sensors while the context lasts."""
-    return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
+@contextmanager
+def compute_only(model: Any, data: Any, sensors: list[int] | slice) -> Iterator[None]:
+    """Compute only these force sensors in the steps within the context, and all others once, for its last step."""
+    before = model.sensor_needstage.copy()
+    model.sensor_needstage[:] = _NEVER
+    model.sensor_needstage[sensors] = before[sensors]
+    try:
+        yield
+    finally:
+        model.sensor_needstage[:] = before
+    mujoco.mj_sensorAcc(model, data)
 
 
 @contextmanager
@@ -170,7 +182,7 @@ def take_snapshot(world: World, data: Any, start: Poses) -> Snapshot:
 def touches_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
     """Whether one of these movable parts touches a part that is not among them; contacts with the arm do not count."""
     ours = {world.free.index(part) for part in parts}
-    pairs = zip(*(of.tolist() for of in _contact_parts(world, data)), strict=True)
+    pairs = world.geom_part[data.contact.geom].tolist()
     return any(a >= 0 and b >= 0 and (a in ours) != (b in ours) for a, b in pairs)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.planning.insertion.insertion_geometry import WALL_MARGIN_M
 from apo_bench.records import describe_outcome
 from apo_bench.simulation.execution import (
     Execution,
@@ -56,6 +56,8 @@ class Start:
     """The insertion axis by the robot's own estimate, unit vector, (3,), world."""
     off: Array
     """True minus measured joint angles, (joints,), [rad]."""
+    sag: Array
+    """Compliance of the joints behind their encoders, (joints,) or (1,), [rad/(N m)]."""
     saved: SavedState
     """The state of the physics and the controller."""
     wrist: WristSensor
@@ -144,6 +146,7 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
         second=second,
         direction=t.into.direction if left is None else left.hand_eye[:3, :3].T @ t.into.direction,
         off=np.zeros(len(robot.scene.arm.joints)) if left is None else left.joints,
+        sag=np.zeros(1) if left is None else left.sag,
         saved=save_state(robot, i, execution.progress),
         # A template without a robot: each episode connects it to its own simulation.
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _no_encoders, np.random.default_rng(0)),

@@ -40,7 +40,7 @@ _FEED = 0.005  # greatest speed of the approach after its first contact, [m/s],
 _EASE = 0.02  # and once it is deeper than this contact by `_DEEP_M`, [m/s]
 _DEEP_M = 0.001  # depth beyond the first contact from which the part is in the hole
 _MET = 0.8  # fraction of the light push from which the approach controls the force
-_STRUCK = 0.03
+_FAST_M_S = 0.03
 """Speed above which the force of a single step stops the approach, [m/s]; below, the filtered force does."""
 _ACROSS_M = 0.015  # greatest lateral offset of the tip from the line of the approach
 _TURN_RAD = math.radians(10.0)  # greatest turn by the actions, about each axis
@@ -80,7 +80,7 @@ class TipControl:
         self.arrived = False
         """Whether the approach is over, so that the part would be released."""
         self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
-        robot.compensate(start.off)
+        robot.compensate(start.off, start.sag)
         restore_state(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
@@ -235,8 +235,8 @@ class TipControl:
             if self.nominal:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
                 # Fast: unfiltered force, since the filter would react too late.
-                struck = -float(np.dot(self._force, direction)) if self._speed > _STRUCK else push
-                if self._stopped is None and max(struck, side) > self._guard:
+                sudden = -float(np.dot(self._force, direction)) if self._speed > _FAST_M_S else push
+                if self._stopped is None and max(sudden, side) > self._guard:
                     # First contact: continue from the measured joint angles, which takes the pressure away.
                     q = robot.encoders()
                     from_there = self._off(robot.scene.kinematics.forward(q))[:3]

@@ -13,9 +13,9 @@ import pytest
 from pyarrow import parquet
 
 from apo_bench import TrialConfig, load_scenario, run_trial
-from apo_bench.benchmark.datasets import making
+from apo_bench.benchmark.datasets import trial_dataset
 from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, replays
-from apo_bench.benchmark.datasets.making import make_dataset
+from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 
@@ -132,7 +132,7 @@ def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monk
             os.kill(os.getpid(), signal.SIGTERM)
             yield each
 
-    monkeypatch.setattr(making, "replays", signalled)
+    monkeypatch.setattr(trial_dataset, "replays", signalled)
     words = ["dataset", "make", "block_on_block", "--episodes", "3", "--format", form, "--out", str(tmp_path / "out")]
     assert main(words) == 128 + signal.SIGTERM
     assert "1 simulated trial," in (tmp_path / "out" / "README.md").read_text()

@@ -13,7 +13,7 @@ from gymnasium.envs.registration import EnvSpec
 from pyarrow import parquet
 
 from apo_bench import InputError, TrialConfig
-from apo_bench.benchmark.datasets.making import make_dataset
+from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 
 REPLAYED = [
     TrialConfig(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
@@ -122,7 +122,9 @@ def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    monkeypatch.setattr("apo_bench.benchmark.datasets.making.scene_of", lambda *_: pytest.fail("a scene was built"))
+    monkeypatch.setattr(
+        "apo_bench.benchmark.datasets.trial_dataset.scene_of", lambda *_: pytest.fail("a scene was built")
+    )
     words = r"^the format lerobot needs the package pyarrow; install it with: pip install"
     with pytest.raises(InputError, match=words):
         make_dataset(REPLAYED[:1], tmp_path / "data", "by hand", "lerobot")

@@ -7,16 +7,16 @@ import pytest
 
 from apo_bench import InputError, load_scenario
 from apo_bench.assembly import Demonstration, build_contact_equations
-from apo_bench.benchmark.datasets import draw_endless_pairs, draw_pairs, drawing
-from apo_bench.benchmark.datasets.drawing import by_part, observe_many
+from apo_bench.benchmark.datasets import draw_endless_pairs, draw_pairs, training_pairs
+from apo_bench.benchmark.datasets.training_pairs import by_part, observe_many
 from apo_bench.benchmark.scoring.track import read_tracks
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.models.symmetric import AnyTurnNoise
+from apo_bench.perception.observation.models.symmetric_parts import AnyTurnNoise
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
-from apo_bench.perception.observation.noise_file import presets
+from apo_bench.perception.observation.noise_file import list_presets
 from apo_bench.scenario import compute_human_error_covariance, list_scenario_names
 from apo_bench.scenario.layout import draw_layouts
-from apo_bench.trial.stages import stream
+from apo_bench.trial.trial_stages import stream
 
 SHARED = {"bias-view", "correlated", "swaps", "displaced-view"}
 """What is seen of one part hangs together with what is seen of another."""
@@ -25,7 +25,9 @@ KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurnNoise]
 
 
 def test_models_whose_parts_are_independent_are_drawn_together() -> None:
-    assert {name for name in (*NOISES, *presets()) if not by_part(make_noise(name, NoiseLevel(1.0, 1.0)))} == SHARED
+    assert {
+        name for name in (*NOISES, *list_presets()) if not by_part(make_noise(name, NoiseLevel(1.0, 1.0)))
+    } == SHARED
     assert not draw_pairs("stick_in_tower", "swaps", 3).together
     assert draw_pairs("stick_in_tower", "bias", 3).together
 
@@ -65,14 +67,14 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
         return np.array([*np.log(quartiles).ravel(), *np.log(stated).ravel(), 3.0 * many.seen.mean(), alike])
 
     together = drawn()
-    monkeypatch.setattr("apo_bench.benchmark.datasets.drawing.by_part", lambda noise: False)
+    monkeypatch.setattr("apo_bench.benchmark.datasets.training_pairs.by_part", lambda noise: False)
     np.testing.assert_allclose(together, drawn(), atol=0.3)
 
 
 @pytest.mark.parametrize("name", ["pocket_table", "gearbox", "dovetail"])
 def test_every_contact_of_the_truth_holds(name: str) -> None:
     scenario = load_scenario(name)
-    layouts = draw_layouts(scenario, drawing.seed_block(0, name, 0), 2)
+    layouts = draw_layouts(scenario, training_pairs.seed_block(0, name, 0), 2)
     many = draw_pairs(name, n=2)
     np.testing.assert_array_equal(many.truth, layouts.poses)
     for i, goals in enumerate(many.truth):
@@ -82,7 +84,7 @@ def test_every_contact_of_the_truth_holds(name: str) -> None:
 
 def test_more_pairs_begin_with_the_same_ones() -> None:
     few = draw_pairs("dovetail", "outliers", 5, 7, noise_level=(1.0, 2.0))
-    many = draw_pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, noise_level=(1.0, 2.0))
+    many = draw_pairs("dovetail", "outliers", training_pairs.BLOCK + 5, 7, noise_level=(1.0, 2.0))
     blocks = draw_endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
     first, second = next(blocks), next(blocks)
     for name in ("poses", "covariance", "seen", "truth"):
@@ -99,7 +101,7 @@ def test_no_stream_of_chance_is_one_of_a_trial() -> None:
     most = max(grid.trials for track in read_tracks(()) for grid in track.grids)
     drawn = [stream(seed, which).random() for seed in range(max(most, 100)) for which in range(12)]
     ours = [
-        drawing.seed_block(seed, name, block).random()
+        training_pairs.seed_block(seed, name, block).random()
         for seed in range(20)
         for name in list_scenario_names()
         for block in range(3)

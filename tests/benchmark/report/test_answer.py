@@ -17,7 +17,7 @@ from apo_bench.benchmark.analysis import (
     contrast,
     summarise,
 )
-from apo_bench.benchmark.report.answer import ALIKE_WITHIN, answer
+from apo_bench.benchmark.report.conclusions import ALIKE_WITHIN, answer
 from tests.benchmark.analysis.test_rates import row
 
 METHODS = ("contact", "uncorrected", "paper", "snap")

@@ -16,9 +16,9 @@ from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
-from apo_bench.records.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_records
+from apo_bench.records.user_code import own_code
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -129,7 +129,7 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
     from apo_bench.cli.shared import print_columns
-    from apo_bench.trial.endings import end_record
+    from apo_bench.trial.record_start_and_end import end_record
     from apo_bench.viz.trial_text import summary_lines
 
     end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)

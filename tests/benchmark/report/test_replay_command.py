@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.report.pictures import sample
+from apo_bench.benchmark.report.failure_choice import sample
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.records.run.replay_command import milli, number, replay_command

@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench import Observation, load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial_stages import simulate_demonstration
 
 SEEDS = range(2)
 

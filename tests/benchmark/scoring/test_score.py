@@ -27,7 +27,7 @@ title = "A small one"
 """
 MOST = 240
 FEWER = {"long": 80, "round": 80, "generated": 80}
-AS_SEEN = """
+AS_OBSERVED = """
 import json, sys
 request = json.loads(sys.stdin.readline())
 print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
@@ -38,7 +38,7 @@ print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
-    (tmp_path / "seen.py").write_text(AS_SEEN)
+    (tmp_path / "seen.py").write_text(AS_OBSERVED)
     return tmp_path
 
 

@@ -21,7 +21,7 @@ import pytest
 from apo_bench import SweepConfig, run_sweep
 from apo_bench.benchmark.sweeps import cluster as on_ray
 from apo_bench.benchmark.sweeps.grid import load_all
-from apo_bench.benchmark.sweeps.travelling import travelling_files
+from apo_bench.benchmark.sweeps.user_files import travelling_files
 from apo_bench.cli.app import main
 from apo_bench.resources import folder
 

@@ -17,7 +17,7 @@ import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.sweeps import pool
-from apo_bench.benchmark.sweeps.stopping import Stopped, stop_at_signals
+from apo_bench.benchmark.sweeps.stop_signals import Stopped, stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Worker
 from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits

@@ -23,9 +23,9 @@ from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.records import ENV_ID, RECORD_SCHEMA, get_record_key, list_setting_columns, make_trial_key
 from apo_bench.records.run.run_folder import read_records
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial import endings, run
-from apo_bench.trial.endings import end_record
+from apo_bench.trial import record_start_and_end, run
 from apo_bench.trial.fingerprint import config_hash
+from apo_bench.trial.record_start_and_end import end_record
 
 METHODS = ("oracle", "uncorrected", "paper")
 SPEC = SweepConfig(
@@ -66,7 +66,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         }
 
     monkeypatch.setattr("apo_bench.benchmark.sweeps.grid.load_scenario", LOAD)
-    monkeypatch.setattr(endings, "load_scenario", LOAD)
+    monkeypatch.setattr(record_start_and_end, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
     monkeypatch.setattr(worker, "demonstration_of", record)
     monkeypatch.setattr(run, "run_trial", run_trial)

@@ -61,7 +61,7 @@ def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> No
     failing = rng.random(len(system.letters)) < 0.3
     free = candidates(scene.assembly, failing)
     assert free == tuple(sorted(set(free), reverse=True))
-    assert set(system.among(system.containing(free)).variables(n)) <= set(free)
+    assert set(system.among(system.contacts_with(free)).variables(n)) <= set(free)
     assert set(system.among(failing).variables(n)) <= set(free)
     fewer = candidates(scene.assembly, failing & (rng.random(len(failing)) < 0.5))
     assert set(fewer) <= set(free)

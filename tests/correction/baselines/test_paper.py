@@ -51,7 +51,7 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
     system = build_contact_equations(scene.assembly, scene.start, goals)
-    return solve_newton(system.among(system.containing(freed)), goals, freed).gap_m * 1e3
+    return solve_newton(system.among(system.contacts_with(freed)), goals, freed).gap_m * 1e3
 
 
 # Freed sets of the paper, most recent first. A set is too small where something remains. Where the size of a remainder

@@ -11,7 +11,7 @@ from apo_bench import Demonstration, draw_layout, load_scenario
 from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 
 
 def observed(name: str, level: float) -> tuple[Observation, np.ndarray]:

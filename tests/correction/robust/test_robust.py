@@ -12,7 +12,7 @@ from apo_bench.assembly import find_faces_away, measure_largest_gap
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, replace_contacts
+from apo_bench.perception.observation.wrong_contacts import find_wrong_relation, make_contacts, replace_contacts
 from apo_bench.trial.pose_error import goal_errors
 from tests.shipped import BOXES
 
@@ -110,7 +110,9 @@ def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     )
     found = correct(wrong, "contact-robust")
     assert found.ok
-    assert found.dropped == (f"{culprit(observation.assembly, wrong.assembly)}: stick.nz on castle1.sfl_shifted",)
+    assert found.dropped == (
+        f"{find_wrong_relation(observation.assembly, wrong.assembly)}: stick.nz on castle1.sfl_shifted",
+    )
     assert found.left_out == ()
     assert f"; left out {found.dropped[0]}" in found.sentence
     lonely = correct(astray(look("block_on_block", 5), 1), "contact-robust")
@@ -128,7 +130,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     assert found.ok
     assert found.left_out == ()
     (dropped,) = found.dropped
-    assert dropped.startswith(f"{culprit(observation.assembly, wrong.assembly)}: ")
+    assert dropped.startswith(f"{find_wrong_relation(observation.assembly, wrong.assembly)}: ")
     assert goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
 
 

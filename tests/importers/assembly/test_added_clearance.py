@@ -9,11 +9,11 @@ import pytest
 
 from apo_bench.geometry import Solid, shrink_pieces
 from apo_bench.importers.assembly.added_clearance import add_clearance
-from apo_bench.importers.assembly.posed import PosedPart
-from apo_bench.importers.assembly.upright import new_upright_scenario
-from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.scenario.file import load_scenario
+from apo_bench.importers.assembly.posed_parts import PosedPart
+from apo_bench.importers.assembly.scenario_writer import write_scenario
+from apo_bench.importers.assembly.up_axis import new_upright_scenario
 from apo_bench.scenario.parts.making import extrude, join, make_rectangle
+from apo_bench.scenario.scenario_file import load_scenario
 from tests.importers.assembly.test_blocked import FLOOR, made
 
 SLOTTED = join(FLOOR, *(extrude(make_rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))

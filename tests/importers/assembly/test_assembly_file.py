@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.from_cad import import_parts
-from apo_bench.importers.assembly.posed import read_posed
+from apo_bench.importers.assembly.posed_parts import read_posed
 from tests.importers.cad.made import block, rod
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.new_scenario import NoAssemblyOrder
-from apo_bench.importers.assembly.posed import PosedPart
-from apo_bench.importers.assembly.upright import new_upright_scenario
-from apo_bench.importers.assembly.writing import scenario_text
+from apo_bench.importers.assembly.posed_parts import PosedPart
+from apo_bench.importers.assembly.scenario_writer import scenario_text
+from apo_bench.importers.assembly.up_axis import new_upright_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import Body, extrude, join, make_rectangle, write_part
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.importers.assembly.checking import check_file
+from apo_bench.importers.assembly.contact_search import find_clashes
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed import on_the_table
-from apo_bench.importers.assembly.touching import find_clashes
-from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.importers.assembly.posed_parts import on_the_table
+from apo_bench.importers.assembly.scenario_check import check_file
+from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import bore, extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made

@@ -10,8 +10,8 @@ import pytest
 from apo_bench import InputError, Scenario, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed import PosedPart, on_the_table
-from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.importers.assembly.posed_parts import PosedPart, on_the_table
+from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
     Body,

@@ -11,9 +11,9 @@ import pytest
 from apo_bench import InputError
 from apo_bench.geometry import Box, Solid, pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed import on_the_table, read_posed
+from apo_bench.importers.assembly.posed_parts import on_the_table, read_posed
+from apo_bench.importers.assembly.scenario_writer import scenario_text
 from apo_bench.importers.assembly.staging import find_stance, stage_parts
-from apo_bench.importers.assembly.writing import scenario_text
 from apo_bench.scenario.parts.making import extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made
 

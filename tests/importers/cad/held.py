@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from apo_bench.importers.cad.importing import ImportedPart
+from apo_bench.importers.cad.part_import import ImportedPart
 from tests.importers.cad.made import Made
 
 FREE_MM = 0.01

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.importing import raw_solids
+from apo_bench.importers.cad.faces.surface_fitting import Round
+from apo_bench.importers.cad.part_import import raw_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from tests.importers.cad.made import block, rod, write_triangles

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from apo_bench.importers.cad.importing import import_solid, raw_solids
-from apo_bench.importers.cad.pieces import cutting
+from apo_bench.importers.cad.part_import import import_solid, raw_solids
+from apo_bench.importers.cad.pieces import convex_cutting
 from tests.importers.cad.made import block, rod, write_stl
 
 RADII = (1.5, 1.5, 1.5, 2.0, 2.0, 2.5)
@@ -27,7 +27,7 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     whole = import_solid(raw, "whole", tmp_path, "a.stl")
     assert len(whole.solid.rounds) == 6
     assert not whole.cut.filled
-    monkeypatch.setattr(cutting, "MOST_PIECES", 130)
+    monkeypatch.setattr(convex_cutting, "MOST_PIECES", 130)
     at_the_second = np.array([[10.0, 0.3, 2.0]])
     part = import_solid(raw, "part", tmp_path, "a.stl", others=at_the_second)
     assert len(part.solid.pieces) <= 130

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.importers.cad.importing import ImportedPart, import_solid, raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, raw_solids
 from apo_bench.scenario.parts import load_part
 from tests.importers.cad.held import hold
 from tests.importers.cad.made import MADE, write_stl

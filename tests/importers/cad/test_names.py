@@ -8,7 +8,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.importers.cad.solids import make_part_name
-from apo_bench.scenario.parts.stated import read_stated_part
+from apo_bench.scenario.parts.stated_properties import read_stated_part
 from tests.importers.cad.made import L_SHAPE, block, prism, write_stl
 
 

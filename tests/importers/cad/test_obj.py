@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from apo_bench import InputError
-from apo_bench.importers.cad.importing import raw_solids
 from apo_bench.importers.cad.meshes.obj import read_obj
 from apo_bench.importers.cad.meshes.shells import closed_solids
+from apo_bench.importers.cad.part_import import raw_solids
 from tests.importers.cad.made import U_SHAPE, area, prism, write_stl, write_triangles
 
 Ring = Sequence[tuple[float, float]]

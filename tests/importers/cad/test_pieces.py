@@ -7,10 +7,10 @@ import pytest
 from manifold3d import CrossSection, Manifold
 
 from apo_bench.geometry import Hull
-from apo_bench.importers.cad.assembled import coming_near, surface_points
 from apo_bench.importers.cad.faces.regions import find_regions
-from apo_bench.importers.cad.pieces.cutting import cut
-from apo_bench.importers.cad.pieces.refining import depths
+from apo_bench.importers.cad.near_points import coming_near, surface_points
+from apo_bench.importers.cad.pieces.convex_cutting import cut
+from apo_bench.importers.cad.pieces.hollow_parts import depths
 from apo_bench.importers.cad.solids import RawSolid, SolidPlace, convert_to_mesh, name_regions
 from tests.importers.cad.made import block
 

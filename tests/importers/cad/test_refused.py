@@ -12,8 +12,8 @@ from manifold3d import Manifold
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.cad import importing
-from apo_bench.importers.cad.importing import import_solid, raw_solids
+from apo_bench.importers.cad import part_import
+from apo_bench.importers.cad.part_import import import_solid, raw_solids
 from tests.importers.cad.made import block, rod, write_stl, write_triangles
 
 
@@ -60,7 +60,7 @@ def test_what_is_no_part_is_refused_in_one_sentence(
 def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It took two minutes and all the memory."""
     (raw,) = raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
-    monkeypatch.setattr(importing, "cut", None)
+    monkeypatch.setattr(part_import, "cut", None)
     with pytest.raises(InputError, match="no face of the part is flat or round"):
         import_solid(raw, "a", tmp_path, "a.stl")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench.importers.cad.importing import import_solid, raw_solids
+from apo_bench.importers.cad.part_import import import_solid, raw_solids
 from apo_bench.importers.cad.part_report import part_lines, report_part
 from apo_bench.importers.cad.solids import RawSolid
 from tests.importers.cad.made import write_triangles

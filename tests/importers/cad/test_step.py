@@ -13,7 +13,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.cad.importing import ImportedPart, import_solid, raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, raw_solids
 from apo_bench.importers.cad.step.brep import read_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from tests.importers.cad.held import hold

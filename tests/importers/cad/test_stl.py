@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError
-from apo_bench.importers.cad.importing import raw_solids
+from apo_bench.importers.cad.part_import import raw_solids
 from tests.importers.cad.made import block, write_stl
 
 

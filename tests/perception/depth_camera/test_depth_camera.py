@@ -13,7 +13,12 @@ from apo_bench.geometry import Array, pose
 from apo_bench.perception.depth_camera.range_finder import VIEWS
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.sensor.rays import ModelRays, Sight
-from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, range_sensor, simulate_demonstration
+from apo_bench.trial.trial_stages import (
+    SimulatedDemonstration,
+    observe_demonstration,
+    range_sensor,
+    simulate_demonstration,
+)
 
 TWO = ("stick_in_tower", "carried_bridge")
 

@@ -10,10 +10,10 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, find_symmetries, pose
-from apo_bench.perception.depth_camera.fit import Points, covariance, refine_fit
-from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
-from apo_bench.perception.depth_camera.range_finder import VIEWS, PinholeView, RangeImage, sense
-from apo_bench.perception.depth_camera.starts import guess_poses
+from apo_bench.perception.depth_camera.icp import Points, compute_fit_covariance, refine_fit
+from apo_bench.perception.depth_camera.icp_starts import guess_poses
+from apo_bench.perception.depth_camera.operation_detection import SensorPriors, follow_demonstration
+from apo_bench.perception.depth_camera.range_finder import VIEWS, PinholeView, RangeImage, simulate_range_image
 from apo_bench.perception.depth_camera.surface import join_surfaces, sample_surface
 from apo_bench.simulation.sensor.rays import ModelRays
 from tests.scenes import block, castle, cube, mm, stick, table
@@ -93,9 +93,9 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
     images = []
     for poses in after:
         true = np.stack([range_of(poses, view) for view in VIEWS])
-        images.append(sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
+        images.append(simulate_range_image(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
     turns = np.array([T[:3, :3] for T in [halfway] * moved_twice + [goal, last]])
-    events = follow_demonstration(images, 0.5e-3, Expected(assembly, start, turns), MODELS)
+    events = follow_demonstration(images, 0.5e-3, SensorPriors(assembly, start, turns), MODELS)
     assert [event.operation for event in events] == [int(moved_twice), 1 + moved_twice]
     for event, T in zip(events, (goal, last), strict=True):
         assert event.found is not None
@@ -109,8 +109,8 @@ def test_exact_points_are_fitted_to_a_tenth_of_a_millimetre_from_some_start(name
     same = find_symmetries(SOLIDS[name])
     surface = SURFACES[name]
     begun = guess_poses(surface.corners, points.at, same)
-    fits = refine_fit(surface, points.thinned(600), begun, 0.012, 15)
-    fits = refine_fit(surface, points.thinned(600), fits.T, 0.0015, 40)
+    fits = refine_fit(surface, points.thin_out(600), begun, 0.012, 15)
+    fits = refine_fit(surface, points.thin_out(600), fits.T, 0.0015, 40)
     best = fits.T[fits.cost.argmin()]
     off = [np.abs(pose.log(pose.inverse(T) @ best @ S)) for S in same]
     assert min(max(xi[:3].max() / 1e-4, xi[3:].max() / np.radians(0.1)) for xi in off) < 1.0
@@ -120,7 +120,7 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
     rng = np.random.default_rng(3)
     surface = SURFACES["castle"]
     T = STANDING
-    exact = points_on("castle", T).thinned(900)
+    exact = points_on("castle", T).thin_out(900)
     noise = 1e-3
     bias = 1e-4
     trials = 120
@@ -132,6 +132,6 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
         seen = Points(exact.at + error[:, None] * exact.ray, exact.ray, exact.view)
         fitted = refine_fit(surface, seen, T[None], 3e-3, 15).T[0]
         xi[i] = pose.log(pose.inverse(T) @ fitted)
-        z[i] = xi[i] @ np.linalg.solve(covariance(surface, seen, fitted, 3e-3, noise, bias), xi[i])
+        z[i] = xi[i] @ np.linalg.solve(compute_fit_covariance(surface, seen, fitted, 3e-3, noise, bias), xi[i])
     assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4
     assert 0.7 < z.mean() / 6.0 < 1.4

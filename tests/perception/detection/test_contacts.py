@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, Observation, detect_contacts, draw_layout, load_scenario
 from apo_bench.assembly import Contact, FacingPair, Operation, compute_placements
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.geometry import Solid, pose
-from apo_bench.perception.detection.belief import Belief, initial_belief
+from apo_bench.perception.detection.kalman_filter import PoseBelief, make_initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
 from apo_bench.perception.observation.models.displacement import floor_covariance
-from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.scenario_file import list_scenario_names
 from tests import scenes
 
 NAMES = sorted(scenes.ALL)
@@ -102,7 +102,7 @@ def test_the_world_frame_does_not_matter(name: str) -> None:
         again = detect_contacts(there).evidence
         assert [(e.made, e.contact) for e in found] == [(e.made, e.contact) for e in again]
         assert_allclose([e.gap_m for e in found], [e.gap_m for e in again], rtol=0, atol=1e-7)
-        assert_allclose([e.most for e in found], [e.most for e in again], rtol=1e-4, atol=1e-7)
+        assert_allclose([e.largest_distance for e in found], [e.largest_distance for e in again], rtol=1e-4, atol=1e-7)
 
 
 def test_what_counts_as_near_follows_the_noise_up_to_a_bound() -> None:
@@ -135,7 +135,7 @@ def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, FacingPair]]:
         for a in solids
         for b in solids
         if a != b
-        for pair in facing(solids[a], at[a], solids[b], at[b], **WIDE)
+        for pair in find_facing_pairs(solids[a], at[a], solids[b], at[b], **WIDE)
     ]
 
 
@@ -169,26 +169,28 @@ def middle_of(pair: FacingPair, T_a: np.ndarray, corner: np.ndarray, normal: np.
 
 
 def same(pair: FacingPair, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> FacingPair:
-    return next(p for p in facing(a, T_a, b, T_b, **WIDE) if (p.a, p.b) == (pair.a, pair.b))
+    return next(p for p in find_facing_pairs(a, T_a, b, T_b, **WIDE) if (p.a, p.b) == (pair.a, pair.b))
 
 
 @pytest.mark.numeric
 @pytest.mark.parametrize("name", NAMES)
 def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
     scene = scenes.ALL[name]()
-    belief = initial_belief(seen_at(scene, 4, 1.0))
+    belief = make_initial_belief(seen_at(scene, 4, 1.0))
     rng = np.random.default_rng(0)
     h = 1e-6
     for k in range(len(scene.assembly)):
-        now = belief.standing(k)
+        now = belief.parts_after(k)
         for part, T in compute_placements(scene.assembly, scene.start, belief.poses)[k].items():
             assert_allclose(now.poses[part], T, rtol=0, atol=1e-12)
         xi = rng.standard_normal(6 * len(belief.poses))
         ends = [
-            Belief(belief.assembly, belief.start, belief.poses @ pose.exp(s * h * xi.reshape(-1, 6)), belief.covariance)
+            PoseBelief(
+                belief.assembly, belief.start, belief.poses @ pose.exp(s * h * xi.reshape(-1, 6)), belief.covariance
+            )
             for s in (1.0, -1.0)
         ]
-        after = [end.standing(k).poses for end in ends]
+        after = [end.parts_after(k).poses for end in ends]
         for part, reach in now.reach.items():
             moved = pose.log(after[0][part] @ pose.inverse(after[1][part])) / (2 * h)
             assert_allclose(reach @ xi, moved, rtol=0, atol=1e-6)
@@ -200,13 +202,13 @@ def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
 def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     """Two measurements one after the other leave the same covariance as both at once, and less than before."""
     rng = np.random.default_rng(seed)
-    belief = initial_belief(seen_at(scenes.bridge(), 0, 1.0))
+    belief = make_initial_belief(seen_at(scenes.bridge(), 0, 1.0))
     n = len(belief.covariance)
     rows = [rng.standard_normal((3, n)) * np.tile(np.repeat([1.0, 0.05], 3), n // 6) for _ in range(2)]
     noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
     after = belief
     for J in rows:
-        after = after.condition(np.zeros(3), J, noise)
+        after = after.update(np.zeros(3), J, noise)
     J = np.concatenate(rows)
     R = np.kron(np.eye(2), noise)
     P = belief.covariance

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, ContactCorrector, Observation
 from apo_bench.assembly import Contact, Operation, PartFace, build_contact_equations
-from apo_bench.geometry import Hull, find_ways_out, pose
+from apo_bench.geometry import Hull, find_escapes, pose
 from apo_bench.geometry.penetration import measure_intrusion
-from apo_bench.perception.detection.estimate import estimate
-from apo_bench.perception.detection.jointly import detect_contacts_jointly
+from apo_bench.perception.detection.joint_detection import detect_contacts_jointly
+from apo_bench.perception.detection.pose_estimate import estimate_poses
 from tests import scenes
 from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated
 
@@ -47,7 +47,7 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
-        estimated = estimate(seen, scene.assembly, seen.poses)
+        estimated = estimate_poses(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector()(seen)
         assert (
             np.abs(build_contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
@@ -106,7 +106,7 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None
         a = replace(a, pieces=tuple(Hull(piece.name, piece.corners) for piece in a.pieces))
     T_a = scenes.mm(45, 3, 26)
     T_b = scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
-    (way,) = find_ways_out(a, T_a, b, T_b, 1e-4)
+    (way,) = find_escapes(a, T_a, b, T_b, 1e-4)
     best = int(way.lengths.argmin())
     assert way.lengths[best] == pytest.approx(measure_intrusion(a, T_a, b, T_b))
     for direction, length in zip(way.directions, way.lengths, strict=True):

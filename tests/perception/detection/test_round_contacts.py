@@ -10,10 +10,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import detect_contacts
-from apo_bench.assembly import FacingPair, classify_contact, compute_placements, find_round_pairs, measure_round
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly import FacingPair, classify_contact, compute_placements, find_round_pairs, measure_round_pair
+from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.perception.detection.thresholds import Rules, pair_thresholds, reality, slack
+from apo_bench.perception.detection.thresholds import (
+    Rules,
+    compute_contact_covariance,
+    compute_contact_slack,
+    compute_pair_thresholds,
+)
 from tests import rounds, scenes
 from tests.brackets import on_pins, under_roof
 from tests.perception.detection.test_contacts import contacts, seen_at, stated
@@ -78,7 +83,7 @@ def pairs_of(name: str, turned_deg: float = 1.0) -> list[Pair]:
         for a in solids
         for b in solids
         if a != b
-        for pair in facing(solids[a], at[a], solids[b], at[b], gap_m=0.02, angle_rad=0.5, share=0.1)
+        for pair in find_facing_pairs(solids[a], at[a], solids[b], at[b], gap_m=0.02, angle_rad=0.5, share=0.1)
         if pair.a in solids[a].rounds or pair.b in solids[b].rounds
     ]
 
@@ -99,7 +104,7 @@ def test_the_derivative_is_right(name: str) -> None:
             rows = slice(0, None) if turned_deg == 0.0 else slice(pair.lengths, None)
             for i in range(6):
                 posed = [pose.exp(sign * h * np.eye(6)[i]) @ T_one for sign in (1.0, -1.0)]
-                ends = [measure_round(one, T, other, T_other).residual for T in posed]
+                ends = [measure_round_pair(one, T, other, T_other).residual for T in posed]
                 assert_allclose((ends[0] - ends[1])[rows] / (2 * h), pair.slope[rows, i], rtol=0, atol=1e-6)
 
 
@@ -116,19 +121,21 @@ COUNTS = {"shaft in hole": (2, 2), "shaft on plane": (1, 1), "cone in cone": (3,
     ],
 )
 def test_as_many_numbers_as_equations_and_as_rarely_missed_as_is_said(name: str, kind: str) -> None:
-    """Of 20000 residuals drawn from a covariance, as many are beyond the thresholds as `miss` says."""
+    """Of 20000 residuals drawn from a covariance, as many are beyond the thresholds as `miss_rate` says."""
     pair = next(p.found for p in pairs_of(name) if classify_contact(p.one, p.other) == kind)
     lengths, tilts = COUNTS[kind]
     assert (pair.lengths, len(pair.residual) - pair.lengths, len(pair.half_m)) == (lengths, tilts, tilts)
     sigma = np.array([2e-3] * lengths + [np.radians(1.0)] * tilts)
-    rules = Rules(miss=0.01, gap_m=0.1, angle_rad=1.0)
-    most = pair_thresholds(rules, np.diag(sigma**2), slack(pair, 0.0), pair.lengths)
+    rules = Rules(miss_rate=0.01, gap_m=0.1, angle_rad=1.0)
+    most = compute_pair_thresholds(rules, np.diag(sigma**2), compute_contact_slack(pair, 0.0), pair.lengths)
     draws = np.random.default_rng(0).standard_normal((20000, len(sigma))) * sigma
     beyond = [_longer(draws[:, :lengths], most.gap_m), _longer(draws[:, lengths:], most.angle_rad)]
     assert beyond[0] == pytest.approx(0.01, abs=0.003)
     assert beyond[1] == (pytest.approx(0.01, abs=0.003) if tilts else 0.0)
-    assert np.mean(((draws / sigma) ** 2).sum(axis=1) > rules.most_of(len(sigma))) == pytest.approx(0.01, abs=0.003)
-    assert np.all(np.linalg.eigvalsh(reality(pair, 0.1e-3)) > 0)
+    assert np.mean(((draws / sigma) ** 2).sum(axis=1) > rules.largest_explained(len(sigma))) == pytest.approx(
+        0.01, abs=0.003
+    )
+    assert np.all(np.linalg.eigvalsh(compute_contact_covariance(pair, 0.1e-3)) > 0)
 
 
 def _longer(draws: Array, most: float) -> float:

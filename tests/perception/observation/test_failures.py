@@ -8,9 +8,9 @@ from numpy.testing import assert_array_equal
 
 from apo_bench import Demonstration, draw_layout, load_scenario
 from apo_bench.geometry import find_approximate_symmetries, pose
-from apo_bench.perception.observation.models.failures import PRESETS, make_failures
+from apo_bench.perception.observation.models.camera_failures import PRESETS, make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.observe import observe
 from apo_bench.perception.observation.reobservations import Reobservations
 
 NOISE_LEVEL = NoiseLevel(1.0, 1.0)

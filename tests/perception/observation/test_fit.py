@@ -12,18 +12,18 @@ from scipy.stats import kstest
 
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_truth import read_truth
-from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
-from apo_bench.perception.observation.models.empirical import residuals_text
+from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit, fit_noise
+from apo_bench.perception.observation.models.empirical import format_residuals
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
-from apo_bench.perception.observation.models.tails import Split, Tail
+from apo_bench.perception.observation.models.truncated_tails import StudentT, TruncatedTails
 from apo_bench.viz.fit_text import fit_form
 from tests import bop_made as made_of
 from tests.bop_made import Known
 
 SPLITS = (
-    Split(Tail(2.0, 4.0), Tail(8.0, 3.0), 50.0),
-    Split(Tail(0.5, 2.0), Tail(13.0, 0.9), 50.0),
-    Split(Tail(3.0), Tail(40.0), 30.0),
+    TruncatedTails(StudentT(2.0, 4.0), StudentT(8.0, 3.0), 50.0),
+    TruncatedTails(StudentT(0.5, 2.0), StudentT(13.0, 0.9), 50.0),
+    TruncatedTails(StudentT(3.0), StudentT(40.0), 30.0),
 )
 
 
@@ -50,13 +50,13 @@ def test_known_parameters_are_recovered_within_five_percent(known_file: Residual
 
 def test_a_right_fit_is_close_everywhere(known_file: Residuals) -> None:
     """The largest difference is what chance makes of so many (1.95 / sqrt(n): one in a thousand)."""
-    for figures in goodness_of_fit(known_file, fit_noise(known_file, "made")):
-        assert figures.distance < 1.95 / np.sqrt(known_file.upright.sum())
+    for figures in compute_goodness_of_fit(known_file, fit_noise(known_file, "made")):
+        assert figures.distance < 1.95 / np.sqrt(known_file.is_upright.sum())
         assert_allclose(figures.fitted, figures.observed, rtol=0.05)
 
 
 @pytest.mark.parametrize("split", SPLITS)
-def test_the_distribution_is_what_is_drawn(split: Split) -> None:
+def test_the_distribution_is_what_is_drawn(split: TruncatedTails) -> None:
     drawn = split.draw(20_000, np.random.default_rng(0))
     length = np.linalg.norm(drawn, axis=1)
     assert length.max() < split.limit
@@ -88,14 +88,14 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     t = drawn.t_seen + np.einsum("nij,nj->ni", drawn.R_seen, beside)
     residuals = compared_files(*made_of.files(tmp_path, drawn._replace(R_seen=drawn.R_seen @ turned, t_seen=t)))
     assert residuals.round_objects == (3,)
-    assert np.median(residuals.across_mm[(part == 2) & ~residuals.upright]) > 10.0
-    kinds = np.array([line.split(",")[3] for line in residuals_text(residuals).splitlines()[1:]])
+    assert np.median(residuals.across_mm[(part == 2) & ~residuals.is_upright]) > 10.0
+    kinds = np.array([line.split(",")[3] for line in format_residuals(residuals).splitlines()[1:]])
     assert set(kinds[part[:: -(-n // len(kinds))] == 3]) == {"turned"}
     measured = fit_noise(residuals, "")
     for mine, known in ((measured.shift_mm, plain.shift_mm), (measured.turn_deg, plain.turn_deg)):
         assert_allclose([*mine.across, *mine.along], [*known.across, *known.along], rtol=0.1)
-    assert all(figures.distance < 1.2 * figures.by_chance for figures in goodness_of_fit(residuals, measured))
-    assert fit_form(residuals, measured, goodness_of_fit(residuals, measured))["round_objects"] == [3]
+    assert all(figures.distance < 1.2 * figures.by_chance for figures in compute_goodness_of_fit(residuals, measured))
+    assert fit_form(residuals, measured, compute_goodness_of_fit(residuals, measured))["round_objects"] == [3]
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> 
     """Median and more of MegaPose on LM-O. Angles by the trace of matrices as written are what was published of it;
     the truth is scaled by up to half a percent, so nearest rotations are farther apart in the lower quartile."""
     measured = fit_noise(lmo, "LM-O")
-    form = fit_form(lmo, measured, goodness_of_fit(lmo, measured))
+    form = fit_form(lmo, measured, compute_goodness_of_fit(lmo, measured))
     assert (form["found"], form["parts"]) == (1205, 1445)
     assert form["inliers"] / form["found"] == pytest.approx(0.82, rel=0.01)
     assert_allclose(form["inlier_across_mm"][1:4], [4.2, 6.5, 9.4], rtol=0.1)

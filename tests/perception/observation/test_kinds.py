@@ -10,18 +10,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, Observation, draw_layout, load_scenario, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models import shared
+from apo_bench.perception.observation.models import shared_bias as shared
 from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.line_of_sight import CameraNoise
 from apo_bench.perception.observation.models.outliers import (
     MISSES,
     OUTLIER_TIMES,
     OUTLIERS,
-    UNSEEN_DEVIATION,
+    UNOBSERVED_DEVIATION,
     OutlierNoise,
 )
-from apo_bench.perception.observation.models.shared import CORRELATION, CorrelatedNoise, ViewBiasNoise
-from apo_bench.perception.observation.models.sighted import CameraNoise
-from apo_bench.perception.observation.models.symmetric import WORSE, SymmetricNoise
+from apo_bench.perception.observation.models.shared_bias import CORRELATION, CorrelatedNoise, ViewBiasNoise
+from apo_bench.perception.observation.models.symmetric_parts import FACTOR, SymmetricNoise
 from apo_bench.perception.observation.noise import Noise, NoiseLevel
 from tests import scenes
 
@@ -91,7 +91,7 @@ def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     there = see(OutlierNoise(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.poses.tobytes() == there.poses.tobytes()
     assert_array_equal(here.covariance, there.covariance)
-    assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
+    assert_allclose(here.covariance[k], np.diag(UNOBSERVED_DEVIATION**2))
 
 
 def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,7 +135,7 @@ def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
         centred.append((to @ xi[..., None])[..., 0])
     rms = np.sqrt(np.mean(np.array(centred) ** 2, axis=0)) / np.repeat([2e-3, np.radians(2.0)], 3)
     expected = np.ones((5, 6))
-    expected[2:, 3] = WORSE
+    expected[2:, 3] = FACTOR
     assert_allclose(rms, expected, rtol=0.13)
 
 

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models import sighted
+from apo_bench.perception.observation.models import line_of_sight as sighted
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.isotropic import IsotropicNoise
@@ -124,8 +124,8 @@ def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pyte
     if hasattr(noise, "camera"):
         noise = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
     if name == "anisotropic":  # its camera is a direction of the world, and so are its draws
-        sight = W[:3, :3] @ sighted.line_of_sight()
-        monkeypatch.setattr(sighted, "line_of_sight", lambda: sight)
+        sight = W[:3, :3] @ sighted.get_line_of_sight()
+        monkeypatch.setattr(sighted, "get_line_of_sight", lambda: sight)
         turn = np.kron(np.eye(2), W[:3, :3].T)
 
         class Turned(np.random.Generator):

@@ -18,14 +18,14 @@ from apo_bench.formats.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
-from apo_bench.perception.observation.models.empirical import EmpiricalNoise, residuals_text
+from apo_bench.perception.observation.models.empirical import EmpiricalNoise, format_residuals
 from apo_bench.perception.observation.models.fitted import FittedNoise
-from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
+from apo_bench.perception.observation.models.outliers import UNOBSERVED_DEVIATION
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
+from apo_bench.perception.observation.noise_file import format_noise_file, list_presets, read_noise
 from apo_bench.trial.fingerprint import config_hash
-from apo_bench.trial.inputs import noise_content
+from apo_bench.trial.input_files import noise_content
 from tests import bop_made as made_of
 from tests import scenes
 from tests.bop_made import Known
@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         residuals = residuals_of(path, known)
         if known is INLIERS:
             residuals = replace(residuals, shift_mm=0.85 * residuals.shift_mm + [0.0, 2.0, 5.0])
-        (path / f"{name}.csv").write_text(residuals_text(residuals), encoding="utf-8")
+        (path / f"{name}.csv").write_text(format_residuals(residuals), encoding="utf-8")
     return path
 
 
@@ -133,7 +133,7 @@ def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> N
             missed += 1
             start = TOWER.start[TOWER.assembly.operations[k].main]
             assert_array_equal(seen.poses[k], start)
-            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNSEEN_DEVIATION)
+            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNOBSERVED_DEVIATION)
     assert missed > 5
 
 
@@ -174,8 +174,10 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
 
 def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    measured, camera = read_noise(presets()["megapose-lmo"])
-    path.write_text(noise_text(measured, ("a note",)) + "[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
+    measured, camera = read_noise(list_presets()["megapose-lmo"])
+    path.write_text(
+        format_noise_file(measured, ("a note",)) + "[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n"
+    )
     noise = make_noise(str(path), NOISE_LEVEL)
     assert isinstance(noise, FittedNoise)
     assert noise.measured == measured
@@ -183,7 +185,7 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     assert_allclose(camera.T_world_camera, Camera().T_world_camera)
 
 
-GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
+GOOD = format_noise_file(read_noise(list_presets()["megapose-lmo"])[0])
 
 
 @pytest.mark.parametrize(

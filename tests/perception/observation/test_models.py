@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.isotropic import IsotropicNoise, PerPartNoise, part_factors
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise, PerPartNoise, draw_part_factors
 from apo_bench.perception.observation.noise import Noise, NoiseLevel
 from tests import scenes
 
@@ -32,6 +32,6 @@ def test_a_part_is_as_bad_in_every_operation() -> None:
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)
     rng.standard_normal((3, 6))
-    factor = part_factors(TOWER.assembly.solids, rng)
+    factor = draw_part_factors(TOWER.assembly.solids, rng)
     assert_allclose(ratio[:, 0], [factor[o.main] for o in TOWER.assembly.operations], rtol=1e-6)
     assert_allclose(seen.covariance, ratio[:, :1, None] ** 2 * plain.covariance, rtol=1e-6)

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import observe
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array
+from apo_bench.perception.observation.function_noise import FunctionNoise
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.plain import Plain
 from apo_bench.viz.noise_sheet import find_facts, list_models
 from tests import scenes
 
@@ -34,7 +34,7 @@ def with_deviations(function, mm: object, deg: object):
     return noise
 
 
-@pytest.mark.parametrize("wrap", [lambda: with_deviations(lifted, 2.0, 0.5), lambda: Plain(lifted, 2.0, 0.5)])
+@pytest.mark.parametrize("wrap", [lambda: with_deviations(lifted, 2.0, 0.5), lambda: FunctionNoise(lifted, 2.0, 0.5)])
 def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
     before = TOWER.nominal_poses.copy()
     seen = observe(SHOWN, make_noise(wrap(), NOISE_LEVEL), np.random.default_rng(4))

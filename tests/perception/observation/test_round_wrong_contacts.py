@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import Assembly
 from apo_bench.assembly import Contact
-from apo_bench.perception.observation.wrong_contacts import FaceOffset, add_contact, culprit, omit_contact
+from apo_bench.perception.observation.wrong_contacts import FaceOffset, add_contact, find_wrong_relation, omit_contact
 from tests import rounds
 from tests.brackets import on_pins
 
@@ -46,7 +46,7 @@ def test_a_round_face_is_off_across_its_axis() -> None:
             by = new.point - old.point
             assert np.linalg.norm(by) == pytest.approx(2e-3)
             assert by @ old.axis == pytest.approx(0.0, abs=1e-12)
-            assert (new.radii, new.span, culprit(scene.assembly, wrong)) == (
+            assert (new.radii, new.span, find_wrong_relation(scene.assembly, wrong)) == (
                 old.radii,
                 old.span,
                 f"R{3 + (part == 'b')}",

@@ -15,12 +15,12 @@ from apo_bench.perception.observation.wrong_contacts import (
     TOUCHING_M,
     FaceOffset,
     add_contact,
-    culprit,
+    find_wrong_relation,
     make_contacts,
     omit_contact,
     replace_contacts,
 )
-from apo_bench.trial.stages import CONTACT_SOURCE, stream
+from apo_bench.trial.trial_stages import CONTACT_SOURCE, stream
 from tests import scenes
 
 SEEDS = range(4)
@@ -84,15 +84,15 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
     scene = scenes.stick_in_tower()
     arguments = (scene.assembly, scene.start, scene.nominal_poses)
     for seed in SEEDS:
-        assert culprit(scene.assembly, omit_contact(*arguments, stream(seed, CONTACT_SOURCE))) is None
+        assert find_wrong_relation(scene.assembly, omit_contact(*arguments, stream(seed, CONTACT_SOURCE))) is None
         for wrong in (
             add_contact(*arguments, stream(seed, CONTACT_SOURCE)),
             FaceOffset()(*arguments, stream(seed, CONTACT_SOURCE)),
         ):
             ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
             (arc,) = [arc for arc in build_relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
-            assert culprit(scene.assembly, wrong) == arc.name
-    assert culprit(scene.assembly, scene.assembly) is None
+            assert find_wrong_relation(scene.assembly, wrong) == arc.name
+    assert find_wrong_relation(scene.assembly, scene.assembly) is None
 
 
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:

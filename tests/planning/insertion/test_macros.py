@@ -10,9 +10,15 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
-from apo_bench.planning.insertion.arrival import Arrival, arrive
-from apo_bench.planning.insertion.attach import Preference
-from apo_bench.planning.insertion.macros import Chain, StraightExit, chain, departure, peel
+from apo_bench.planning.insertion.arrival import Arrival, plan_arrival
+from apo_bench.planning.insertion.attach_line import Preference
+from apo_bench.planning.insertion.macros import (
+    MacroChain,
+    StraightExit,
+    build_macro_chain,
+    invert_macros,
+    peel_contacts,
+)
 from tests import scenes
 
 X, Y, Z = np.eye(3)
@@ -23,11 +29,11 @@ def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
     return StraightExit(along[0], 0.1, True)
 
 
-def made(*normals: Array) -> Chain:
-    return chain(np.array(normals).reshape(-1, 3), out)
+def made(*normals: Array) -> MacroChain:
+    return build_macro_chain(np.array(normals).reshape(-1, 3), out)
 
 
-def names(found: Chain) -> list[str]:
+def names(found: MacroChain) -> list[str]:
     return [macro.name for macro in found.macros]
 
 
@@ -74,13 +80,13 @@ def test_what_carries_is_met_first_and_from_above() -> None:
 
 def test_a_part_leaves_the_way_it_came() -> None:
     """Sides first, then out of walls; from supports alone it is just lifted."""
-    assert departure(made(Z), (0,)) == ()
-    (off,) = departure(made(Z, X), (0,))
+    assert invert_macros(made(Z), (0,)) == ()
+    (off,) = invert_macros(made(Z, X), (0,))
     assert (off.name, off.direction.tolist(), off.makes) == ("depart", [1.0, 0.0, 0.0], (1,))
-    (pulled,) = departure(made(Y, -Y, Z, -Z), (2,))
+    (pulled,) = invert_macros(made(Y, -Y, Z, -Z), (2,))
     assert pulled.length_m == 0.1
     assert abs(pulled.direction[0]) == pytest.approx(1.0)
-    back = departure(made(X, Y, -Y, Z), (3,))
+    back = invert_macros(made(X, Y, -Y, Z), (3,))
     assert back[0].makes == (0,), "off the end of the slot first"
 
 
@@ -91,7 +97,7 @@ def test_peeling_takes_off_everything_that_is_not_locked() -> None:
         normals = n / np.linalg.norm(n, axis=1)[:, None]
         if rng.integers(2):
             normals = np.concatenate([normals, -normals[:1]])
-        layers = peel(normals)
+        layers = peel_contacts(normals)
         assert sorted(i for layer in layers for i in layer.breaks) == list(range(len(normals)))
         assert [layer.locked for layer in layers[:-1]] == [False] * (len(layers) - 1)
         for layer in layers:
@@ -111,7 +117,7 @@ def assembly(contacts: dict[str, Sequence[str]], **parts: tuple[Solid, Array]) -
 
 def arrival(built: tuple[Assembly, dict[str, Array]], stated: Preference | None = None) -> Arrival:
     of, poses = built
-    return arrive(of, ("part",), of.operations[0].contacts, poses, stated or Preference())
+    return plan_arrival(of, ("part",), of.operations[0].contacts, poses, stated or Preference())
 
 
 def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:

@@ -9,9 +9,9 @@ import pytest
 
 from apo_bench.assembly import compute_placements
 from apo_bench.geometry import Array
-from apo_bench.planning.insertion.arrival import Arrival, arrive, turning_state
-from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
-from apo_bench.planning.insertion.surroundings import slide_directions
+from apo_bench.planning.insertion.arrival import Arrival, compute_screw_state, plan_arrival
+from apo_bench.planning.insertion.insertion_geometry import list_slide_directions
+from apo_bench.planning.insertion.operation_macros import OperationMacros, describe_operation_macros
 from tests import rounds
 from tests.brackets import under_roof
 from tests.scenes import Scene
@@ -26,7 +26,7 @@ def built(name: str) -> Scene:
 
 @lru_cache
 def last_of(made: Scene) -> OperationMacros:
-    return understand(made.assembly, made.start, made.nominal_poses)[-1]
+    return describe_operation_macros(made.assembly, made.start, made.nominal_poses)[-1]
 
 
 def poses_of(made: Scene) -> dict[str, Array]:
@@ -77,7 +77,7 @@ def test_states_and_macros(name: str, letter: str, macros: list, length_mm: floa
 def test_what_turns_freely(name: str, screw: tuple[int, int, int]) -> None:
     """A shaft turns in its hole, a cone on a rim about all axes: as many directions are kept as no row fixes."""
     made = built(name)
-    assert turning_state(made.assembly, last_of(made).after, poses_of(made)).all == screw
+    assert compute_screw_state(made.assembly, last_of(made).after, poses_of(made)).all == screw
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -86,12 +86,12 @@ def test_a_wedge_is_slid_under_its_roof(turned: bool) -> None:
     made = under_roof(30.0)
     (operation,) = made.assembly.operations
     contacts = operation.contacts[::-1] if turned else operation.contacts
-    found = arrive(made.assembly, ("wedge",), contacts, made.start | {"wedge": made.nominal_poses[0]})
+    found = plan_arrival(made.assembly, ("wedge",), contacts, made.start | {"wedge": made.nominal_poses[0]})
     assert (found.state.letter, found.free) == ("C", True)
     in_ = [0.0, -1.0, 0.0] if found.macros[1].direction[1] < 0 else [0.0, 1.0, 0.0]
     assert told(found) == [("move-to-contact", DOWN), ("slide-to-contact", in_)]
     assert found.line.direction.tolist() == pytest.approx(in_, abs=1e-9)
-    (side,) = slide_directions(made.assembly, found, made.start | {"wedge": made.nominal_poses[0]})
+    (side,) = list_slide_directions(made.assembly, found, made.start | {"wedge": made.nominal_poses[0]})
     assert side == pytest.approx(in_, abs=1e-9)
     roof = made.start["roof"][:3, :3] @ made.assembly.solids["roof"].faces["slope"].normal
     assert roof @ in_ < 0.0, "towards the roof"

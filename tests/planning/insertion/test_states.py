@@ -9,7 +9,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Array
-from apo_bench.planning.insertion.states import STATE_LETTERS, ContactState, classify, null_space, row_rank, screw_state
+from apo_bench.planning.insertion.contact_states import (
+    STATE_LETTERS,
+    ContactState,
+    classify_motions,
+    classify_with_rotations,
+    compute_null_space,
+    compute_row_rank,
+)
 
 X, Y, Z = np.eye(3)
 TEN = {
@@ -33,12 +40,12 @@ def rows(normals: list[Array]) -> Array:
 @pytest.mark.parametrize("letter", TEN)
 def test_a_state_does_not_depend_on_the_frame_the_order_or_on_repetition(letter: str) -> None:
     rng = np.random.default_rng(4)
-    state = classify(rows(TEN[letter])).state
+    state = classify_motions(rows(TEN[letter])).state
     assert (state.letter, sum(state), STATE_LETTERS[tuple(state)]) == (letter, 3, letter)
     for R in Rotation.random(10, random_state=rng).as_matrix():
         normals = rows(TEN[letter]) @ R.T
         again = np.concatenate([normals, normals])[rng.permutation(2 * len(normals))]
-        assert classify(again).state == state
+        assert classify_motions(again).state == state
 
 
 def random_contacts(rng: np.random.Generator) -> Array:
@@ -59,7 +66,7 @@ def random_contacts(rng: np.random.Generator) -> Array:
 
 def corners_of_cone(normals: Array) -> Array:
     """Vectors that span the cone exactly: its linear space both ways, and where two faces of the rest meet, (k, 3)."""
-    lines = null_space(normals)
+    lines = compute_null_space(normals)
     edges = [np.cross(a, b) for a, b in combinations([*normals, *lines], 2)]
     edges += [a - sum(((a @ line) * line for line in lines), np.zeros(3)) for a in normals]
     found = [sign * edge / np.linalg.norm(edge) for edge in edges if np.linalg.norm(edge) > 1e-7 for sign in (-1, 1)]
@@ -72,9 +79,9 @@ def test_the_programme_agrees_with_the_corners_of_the_cone() -> None:
     rng = np.random.default_rng(3)
     for _ in range(80):
         normals = random_contacts(rng)
-        found = classify(normals)
-        spanned = row_rank(corners_of_cone(normals))
-        m = 3 - row_rank(normals)
+        found = classify_motions(normals)
+        spanned = compute_row_rank(corners_of_cone(normals))
+        m = 3 - compute_row_rank(normals)
         assert found.state == ContactState(m, spanned - m, 3 - spanned)
         assert found.admits(found.direction, 1e-9)
         assert (normals[found.detachable] @ found.direction > 0.0).all()
@@ -104,7 +111,7 @@ def test_states_with_rotation(faces: tuple, everything: tuple, rotation: tuple) 
     normals = np.concatenate([face[1] for face in faces])
     rng = np.random.default_rng(6)
     for R in Rotation.random(5, random_state=rng).as_matrix():
-        found = screw_state(points @ R.T + rng.standard_normal(3), normals @ R.T)
+        found = classify_with_rotations(points @ R.T + rng.standard_normal(3), normals @ R.T)
         assert (found.all, found.rotation) == (everything, rotation)
         assert sum(found.all) == 6
         assert sum(found.rotation) == 3

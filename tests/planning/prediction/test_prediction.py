@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Plan
-from apo_bench.assembly import Meetings, Step, compute_placements
+from apo_bench.assembly import ContactMeasurements, Step, compute_placements
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.attach import Attach
-from apo_bench.planning.prediction.failure import Prediction, predict
-from apo_bench.planning.prediction.measures import ArmMove
-from apo_bench.planning.prediction.resting import is_support, residuals, resting_poses
+from apo_bench.planning.insertion.attach_line import Attach
+from apo_bench.planning.prediction.first_failure import Prediction, predict_failure
+from apo_bench.planning.prediction.plan_measures import ArmMove
+from apo_bench.planning.prediction.rest_poses import is_support, list_residuals, predict_rest_poses
 from apo_bench.records import Thresholds
 from tests import rounds, scenes
 
@@ -37,7 +37,7 @@ def ways(scene: scenes.Scene) -> list[Attach]:
 
 def said(scene: scenes.Scene, goals: Array, attach: Sequence[Attach] | None = None, **plan: object) -> Prediction:
     asked = Plan(scene.assembly, scene.start, goals, **plan)
-    return predict(asked, CLEARANCE_MM, Thresholds(), ways(scene) if attach is None else attach)
+    return predict_failure(asked, CLEARANCE_MM, Thresholds(), ways(scene) if attach is None else attach)
 
 
 def off(scene: scenes.Scene, operation: int, T: Array) -> Array:
@@ -96,18 +96,18 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
     for operation, goal in zip(scene.assembly.operations, goals, strict=True):
         alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
         (brought,) = compute_placements(alone, poses, goal[None])
-        rests = resting_poses(alone, operation, brought)
+        rests = predict_rest_poses(alone, operation, brought)
         touched = [c for c in operation.contacts if not alone.is_fit(c)]
         sides = [c for c in touched if not is_support(alone, c, rests)]
         for contact in touched:
-            e, _ = residuals(Meetings(alone), [contact], rests)[0][0]
+            e, _ = list_residuals(ContactMeasurements(alone), [contact], rests)[0][0]
             assert (e.min() if contact in sides else np.abs(e).max()) == pytest.approx(0.0, abs=2e-5)
         for part, T in rests.items():
             assert part in operation.moves or T is brought[part]
             relative = pose.inverse(rests[operation.main]) @ T
             if part in operation.moves:
                 np.testing.assert_allclose(relative, pose.inverse(brought[operation.main]) @ brought[part], atol=1e-12)
-        again = resting_poses(alone, operation, rests)
+        again = predict_rest_poses(alone, operation, rests)
         np.testing.assert_allclose(again[operation.main], rests[operation.main], rtol=0, atol=2e-5)
         poses = dict(rests)
 
@@ -181,7 +181,7 @@ def by_arm(k: int, **made: object) -> Prediction:
     scene = scenes.ALL["stick_in_tower"]()
     plan = Plan(scene.assembly, scene.start, scene.nominal_poses)
     moves = [ArmMove(i, **(made if i == k else {})) for i in range(len(scene.nominal_poses))]
-    return predict(plan, CLEARANCE_MM, Thresholds(), ways(scene), moves)
+    return predict_failure(plan, CLEARANCE_MM, Thresholds(), ways(scene), moves)
 
 
 def test_what_an_arm_cannot_do_is_foretold() -> None:
@@ -190,7 +190,7 @@ def test_what_an_arm_cannot_do_is_foretold() -> None:
     short = by_arm(last, refused="unreachable", at_limit="j4")
     assert (short.operation, short.code, short.size_mm) == (last, "unreachable", None)
     assert short.sentence.endswith("the arm does not reach the goal, or the way to it: its joint 'j4' is at its limit")
-    assert by_arm(1, struck="foot", struck_mm=0.9).code == "ok"
-    narrow = by_arm(1, struck="foot", struck_mm=1.1)
+    assert by_arm(1, collides_with="foot", collision_mm=0.9).code == "ok"
+    narrow = by_arm(1, collides_with="foot", collision_mm=1.1)
     assert (narrow.operation, narrow.code, narrow.size_mm) == (1, "gripper_room", 1.1)
     assert "in 'foot'" in narrow.sentence

@@ -6,7 +6,7 @@ import pytest
 
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.prediction.stability import first_unstable
+from apo_bench.planning.prediction.stability import find_first_unstable
 from tests import rounds, scenes
 
 pytestmark = pytest.mark.numeric
@@ -16,14 +16,14 @@ def falls(scene: scenes.Scene, operation: int, T: Array) -> int | None:
     """The verdict if that operation (from 1) had another goal, displaced in the frame of its part; counted from 1."""
     goals = scene.nominal_poses.copy()
     goals[operation - 1] = goals[operation - 1] @ T
-    found = first_unstable(scene.assembly, scene.start, goals)
+    found = find_first_unstable(scene.assembly, scene.start, goals)
     return None if found is None else found + 1
 
 
 @pytest.mark.parametrize("build", [*scenes.ALL.values(), *rounds.ALL.values()])
 def test_the_examples_of_the_paper_and_round_parts_stand(build) -> None:
     scene = scenes.turned(build(), pose.at((0.1, 0.05, 0.0), (0.0, 0.0, 37.0)))
-    assert first_unstable(scene.assembly, scene.start, scene.nominal_poses) is None
+    assert find_first_unstable(scene.assembly, scene.start, scene.nominal_poses) is None
 
 
 @pytest.mark.parametrize(("beyond_mm", "expected"), [(-1.0, None), (1.0, 1)])

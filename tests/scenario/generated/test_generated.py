@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import compute_placements
 from apo_bench.errors import InputError
-from apo_bench.importers.assembly.touching import find_contacts
+from apo_bench.importers.assembly.contact_search import find_contacts
 from apo_bench.scenario import find_scenario_path, list_nominal_operations
 from apo_bench.scenario.generated import FAMILIES, complete_name, generate_assembly, write_generated
 from apo_bench.scenario.parts import load_part

@@ -14,7 +14,7 @@ from apo_bench import InputError, build_scene, load_scenario
 from apo_bench.geometry import Box, measure_face_area
 from apo_bench.resources import folder
 from apo_bench.scenario.parts import find_part_path, list_part_names, load_part
-from apo_bench.scenario.parts.faces import SIDES, unite
+from apo_bench.scenario.parts.box_union import SIDES, unite
 
 SIX = ("px", "nx", "py", "ny", "pz", "nz")
 POCKETS = tuple(f"{pocket}_{wall}" for pocket in "AB" for wall in ("px", "nx", "py", "ny"))

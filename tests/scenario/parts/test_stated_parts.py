@@ -12,8 +12,8 @@ import pytest
 from apo_bench import InputError, build_scene, load_scenario
 from apo_bench.resources import folder
 from apo_bench.scenario.parts import find_part_path, list_part_names, load_part, read_part
-from apo_bench.scenario.parts.checking import check_part
 from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft, write_part
+from apo_bench.scenario.parts.mass_checks import check_part
 
 MADE = join(
     extrude(

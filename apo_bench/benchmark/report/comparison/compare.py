@@ -17,7 +17,7 @@ from apo_bench.benchmark.analysis import (
     make_sort_key,
     tally,
 )
-from apo_bench.benchmark.report.trials import NUMBERS, verdict, why
+from apo_bench.benchmark.report.trial_text import NUMBERS, verdict, why
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.records import KEY, SETTINGS, Key, describe_secret_seed, get_record_key

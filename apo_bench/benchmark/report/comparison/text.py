@@ -6,10 +6,10 @@ from typing import Any
 
 from apo_bench.benchmark.analysis import FEWEST_SEEDS, Interval, Line, format_percent, format_percent_interval
 from apo_bench.benchmark.report.comparison.compare import Comparison
-from apo_bench.benchmark.report.facts import value_words
 from apo_bench.benchmark.report.page.page import Section, page
+from apo_bench.benchmark.report.run_facts import value_words
 from apo_bench.benchmark.report.tables.table import Table, TableColumn, fill
-from apo_bench.benchmark.report.trials import NUMBERS
+from apo_bench.benchmark.report.trial_text import NUMBERS
 from apo_bench.errors import InputError
 from apo_bench.io import format_count, write_file
 

@@ -20,7 +20,7 @@ from apo_bench.benchmark.analysis import (
     group_by_condition,
     list_levels,
 )
-from apo_bench.benchmark.report.trials import NUMBERS, predicted, verdict, why
+from apo_bench.benchmark.report.trial_text import NUMBERS, predicted, verdict, why
 from apo_bench.io import group_by
 from apo_bench.records import Limits, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed

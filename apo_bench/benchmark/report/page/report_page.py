@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.benchmark.analysis import ConditionResult, get_condition, group_by_setting, list_settings
-from apo_bench.benchmark.report.facts import run_facts
+from apo_bench.benchmark.report.failure_choice import FailurePicture
 from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.benchmark.report.page.matrix import matrix, pack_trials
 from apo_bench.benchmark.report.page.page import Section, as_data, page
-from apo_bench.benchmark.report.pictures import FailurePicture
+from apo_bench.benchmark.report.run_facts import run_facts
 from apo_bench.benchmark.report.tables.table import Table
-from apo_bench.benchmark.report.trials import why
+from apo_bench.benchmark.report.trial_text import why
 from apo_bench.io import format_count
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, scenario_files

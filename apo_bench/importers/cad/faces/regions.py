@@ -6,8 +6,8 @@ import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
-from apo_bench.importers.cad.faces.fitting import fit_plane, round_region
-from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_groups
+from apo_bench.importers.cad.faces.region_growing import FoundWall, find_walls, smooth_groups
+from apo_bench.importers.cad.faces.surface_fitting import fit_plane, round_region
 from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
 _LARGER = 8.0

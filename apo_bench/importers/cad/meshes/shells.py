@@ -8,7 +8,7 @@ import manifold3d
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
+from apo_bench.importers.cad.meshes.corner_merging import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.solids import (
     Mesh,
     RawSolid,

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from apo_bench.geometry import Array, Cylinder, Hull, count_sides, make_cylinder_hull
 from apo_bench.importers.cad.pieces.corners import merge_near_points
 from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
-from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
+from apo_bench.scenario.parts.limits import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
 """A gap between corners of a ring that is wider than the median by this factor is no part of the wall."""

@@ -58,7 +58,7 @@ class Mesh:
 
     @cached_property
     def edges(self) -> Any:
-        """The two corners of each edge, (e, 2), in the order of `neighbours`."""
+        """The two corners of each edge, (e, 2), in the order of `list_neighbours`."""
         return self.sides[self.twins[:, 0]]
 
     @cached_property

@@ -13,7 +13,7 @@ from apo_bench.importers.cad.solids.mesh import Mesh
 from apo_bench.importers.cad.solids.raw_solid import RawSolid
 from apo_bench.importers.cad.solids.region import Region
 from apo_bench.io import clean
-from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
+from apo_bench.scenario.parts.limits import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
 _LONGEST_PART_NAME = 48  # characters
 _LONGEST_TITLE = 200  # characters

@@ -8,7 +8,7 @@ import numpy as np
 from OCP import Bnd, BRep, BRepAdaptor, BRepBndLib, BRepMesh, ShapeAnalysis, TopAbs, TopExp, TopLoc, TopoDS, gp
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.faces.fitting import Round
+from apo_bench.importers.cad.faces.surface_fitting import Round
 from apo_bench.importers.cad.solids import SolidPlace
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.importers.cad.step.tree import matrix_of, read_leaves

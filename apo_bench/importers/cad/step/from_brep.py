@@ -8,8 +8,14 @@ from scipy.spatial import ConvexHull
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
-from apo_bench.importers.cad.faces.fitting import Round, border_of, measure_wall_turn, plane_region, round_region
-from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
+from apo_bench.importers.cad.faces.surface_fitting import (
+    Round,
+    border_of,
+    measure_wall_turn,
+    plane_region,
+    round_region,
+)
+from apo_bench.importers.cad.meshes.corner_merging import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
 from apo_bench.importers.cad.solids import (
     Mesh,

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.faces.fitting import Round
+from apo_bench.importers.cad.faces.surface_fitting import Round
 from apo_bench.importers.cad.solids import SolidPlace
 
 _SAME = 1e-6

@@ -14,7 +14,7 @@ from apo_bench.perception.observation.models import (
     TURNED_DEG,
     MeasuredNoise,
     Residuals,
-    Split,
+    TruncatedTails,
     compute_log_density_across,
     compute_log_density_along,
     unpack_tails,
@@ -30,7 +30,7 @@ PERCENTILES = (25, 50, 75, 90, 95)
 """Percentiles at which measured and fitted errors are compared."""
 
 
-class Figures(NamedTuple):
+class GoodnessOfFit(NamedTuple):
     """Goodness of fit of one error component."""
 
     name: str
@@ -45,7 +45,7 @@ class Figures(NamedTuple):
     """95 % quantile of that distance for independent errors that follow the fitted distribution."""
 
 
-class Band(NamedTuple):
+class ScoreBand(NamedTuple):
     """Estimates with similar confidence scores."""
 
     least: float
@@ -66,9 +66,9 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
     Raises:
         InputError: There are too few inliers, or nearly all are exact.
     """
-    found = residuals.found
-    upright = residuals.upright
-    known = residuals.turn_known
+    found = residuals.is_estimated
+    upright = residuals.is_upright
+    known = residuals.has_rotation_error
     near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
     for kept, limit in ((upright, near), (known, f"{near} and do not look alike when turned by any angle")):
         if kept.sum() < _FEWEST:
@@ -76,18 +76,18 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
                 f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
                 "needed for a fit, so give more images, or the truth of the same ones."
             )
-    far = residuals.off_mm[found & ~residuals.inlier]
+    far = residuals.distance_from_truth_mm[found & ~residuals.is_inlier]
     return MeasuredNoise(
         source=source,
         shift_mm=fit_split(residuals.shift_mm[upright], INLIER_MM, "places"),
         turn_deg=fit_split(residuals.turn_deg[known], TURNED_DEG, "rotations"),
         missed=float(1.0 - found.mean()),
-        outliers=float(1.0 - residuals.inlier.sum() / found.sum()),
+        outliers=float(1.0 - residuals.is_inlier.sum() / found.sum()),
         farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
     )
 
 
-def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
+def fit_split(errors: Array, limit: float, name: str = "errors") -> TruncatedTails:
     """Fit scales and degrees of freedom to errors by maximum likelihood.
 
     The likelihood is that of the distribution truncated at the limit, so the cut does not shorten the fitted tails.
@@ -111,7 +111,7 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         # Mean negative log-likelihood of the truncated distribution.
         split = unpack_tails(at, limit)
         seen = compute_log_density_across(split.across, r).mean() + compute_log_density_along(split.along, x).mean()
-        return float(np.log(max(split.inside, 1e-300)) - seen)
+        return float(np.log(max(split.probability_inside, 1e-300)) - seen)
 
     # Medians of a Gaussian: 1.18 s of a length across (Rayleigh), 0.675 s of a size along.
     low = np.log(SMALLEST_SCALE * limit)
@@ -127,40 +127,46 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
     return unpack_tails(best.x, limit)
 
 
-def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
+def count_outliers_by_score(residuals: Residuals) -> tuple[ScoreBand, ...]:
     """Outlier rates of `_BANDS` equally large bands of estimates, lowest scores first.
 
     Empty if there are too few scores or bands begin with equal scores.
     """
-    found = residuals.found & np.isfinite(residuals.score)
+    found = residuals.is_estimated & np.isfinite(residuals.score)
     order = np.argsort(residuals.score[found], kind="stable")
     if len(order) < _BANDS * _FEWEST:
         return ()
     score = residuals.score[found][order]
-    inlier = residuals.inlier[found][order]
+    inlier = residuals.is_inlier[found][order]
     each = [
-        Band(float(s[0]), 1.0 - float(i.mean()))
+        ScoreBand(float(s[0]), 1.0 - float(i.mean()))
         for s, i in zip(*(np.array_split(x, _BANDS) for x in (score, inlier)), strict=True)
     ]
     return tuple(each) if len({band.least for band in each}) == _BANDS else ()
 
 
-def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
+def compute_goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[GoodnessOfFit, ...]:
     """Goodness of fit of the four fitted distributions: position and rotation, across and along the ray."""
     shift = measured.shift_mm
     turn = measured.turn_deg
-    turned = residuals.turn_deg[residuals.turn_known]
+    turned = residuals.turn_deg[residuals.has_rotation_error]
     tilt = np.linalg.norm(turned[:, :2], axis=1)
     about = np.abs(turned[:, 2])
     return (
-        _figures("across the ray", "mm", residuals.across_mm[residuals.upright], shift.cdf_across, shift.limit),
-        _figures("along the ray", "mm", residuals.along_mm[residuals.upright], shift.cdf_along, shift.limit),
-        _figures("tilt", "deg", tilt, turn.cdf_across, turn.limit),
-        _figures("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
+        _compare_distribution(
+            "across the ray", "mm", residuals.across_mm[residuals.is_upright], shift.cdf_across, shift.limit
+        ),
+        _compare_distribution(
+            "along the ray", "mm", residuals.along_mm[residuals.is_upright], shift.cdf_along, shift.limit
+        ),
+        _compare_distribution("tilt", "deg", tilt, turn.cdf_across, turn.limit),
+        _compare_distribution("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
     )
 
 
-def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> Figures:
+def _compare_distribution(
+    name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float
+) -> GoodnessOfFit:
     """Compare measured sizes (n,) with a fitted cumulative distribution up to the limit."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
@@ -169,7 +175,7 @@ def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], 
     at = np.interp(ordered, grid, chance)
     # The empirical distribution steps from (i - 1) / n to i / n at the i-th size; the distance is largest at a step.
     step = np.arange(n + 1) / n
-    return Figures(
+    return GoodnessOfFit(
         name=name,
         unit=unit,
         observed=np.percentile(sizes, PERCENTILES),

@@ -6,13 +6,19 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.models import LEAST_FREEDOM, SMALLEST_SCALE, Split, Tail, unpack_tails
+from apo_bench.perception.observation.models import (
+    LEAST_FREEDOM,
+    SMALLEST_SCALE,
+    StudentT,
+    TruncatedTails,
+    unpack_tails,
+)
 
 LOWER_QUARTILE_OF_THREE = 1.10115
 """Lower quartile of the length of a vector of three standard normal numbers (chi with three degrees of freedom)."""
 
 
-def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, float], limit: float) -> Split:
+def fit_split_to_quantiles(across: Mapping[float, float], along: Mapping[float, float], limit: float) -> TruncatedTails:
     """Fit a distribution to quantiles, by least squares of their logarithms.
 
     Args:
@@ -50,7 +56,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
     return unpack_tails(best.x, limit)
 
 
-def round_split(lower_quartile: float, limit: float) -> Split:
+def make_round_split(lower_quartile: float, limit: float) -> TruncatedTails:
     """The isotropic Gaussian whose length has this lower quartile, truncated at the limit."""
-    tail = Tail(lower_quartile / LOWER_QUARTILE_OF_THREE)
-    return Split(tail, tail, limit)
+    tail = StudentT(lower_quartile / LOWER_QUARTILE_OF_THREE)
+    return TruncatedTails(tail, tail, limit)

@@ -1,10 +1,10 @@
 """The noise models of the package, with the cameras and distributions that they share."""
 
 from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.camera_failures import CameraFailures
 from apo_bench.perception.observation.models.displacement import add_shared_error, floor_covariance
 from apo_bench.perception.observation.models.empirical import EmpiricalNoise, load_empirical_noise
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
-from apo_bench.perception.observation.models.failures import CameraFailures
 from apo_bench.perception.observation.models.fitted import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
@@ -12,14 +12,18 @@ from apo_bench.perception.observation.models.fitted import (
     MeasuredNoise,
 )
 from apo_bench.perception.observation.models.isotropic import HeavyTailedNoise, IsotropicNoise, PerPartNoise
-from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, OutlierNoise, find_last_seen
+from apo_bench.perception.observation.models.line_of_sight import AnisotropicNoise, CameraNoise
+from apo_bench.perception.observation.models.outliers import (
+    UNOBSERVED_DEVIATION,
+    OutlierNoise,
+    find_last_observed_poses,
+)
 from apo_bench.perception.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.perception.observation.models.shared import BiasNoise
-from apo_bench.perception.observation.models.sighted import AnisotropicNoise, CameraNoise
-from apo_bench.perception.observation.models.symmetric import AnyTurnNoise, SymmetricNoise
-from apo_bench.perception.observation.models.tails import (
-    Split,
-    Tail,
+from apo_bench.perception.observation.models.shared_bias import BiasNoise
+from apo_bench.perception.observation.models.symmetric_parts import AnyTurnNoise, SymmetricNoise
+from apo_bench.perception.observation.models.truncated_tails import (
+    StudentT,
+    TruncatedTails,
     compute_log_density_across,
     compute_log_density_along,
     unpack_tails,
@@ -30,7 +34,7 @@ __all__ = (
     "LEAST_FREEDOM",
     "SMALLEST_SCALE",
     "TURNED_DEG",
-    "UNSEEN_DEVIATION",
+    "UNOBSERVED_DEVIATION",
     "AnisotropicNoise",
     "AnyTurnNoise",
     "BiasNoise",
@@ -47,13 +51,13 @@ __all__ = (
     "OutlierNoise",
     "PerPartNoise",
     "Residuals",
-    "Split",
+    "StudentT",
     "SymmetricNoise",
-    "Tail",
+    "TruncatedTails",
     "add_shared_error",
     "compute_log_density_across",
     "compute_log_density_along",
-    "find_last_seen",
+    "find_last_observed_poses",
     "floor_covariance",
     "load_empirical_noise",
     "unpack_tails",

@@ -20,7 +20,7 @@ CAMERA_ELEVATION_DEG = 40.0
 """Its elevation above the table."""
 CAMERA_AZIMUTH_DEG = 25.0
 """Its azimuth from the x axis of the world."""
-_BEHIND = 1e-9
+_LEAST_COSINE = 1e-9
 """A ray whose cosine with the optical axis is this near to -1 has no unique smallest rotation."""
 
 
@@ -69,7 +69,7 @@ class Camera:
         ray = self.rays(poses) @ R
         K = pose.hat(np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1))
         cosine = ray[:, 2, None, None]
-        behind = cosine < _BEHIND - 1.0
+        behind = cosine < _LEAST_COSINE - 1.0
         shortest = np.eye(3) + K + K @ K / np.where(behind, 1.0, 1.0 + cosine)
         return np.asarray(R @ np.where(behind, np.diag([1.0, -1.0, -1.0]), shortest))
 

@@ -19,12 +19,12 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
         xi: (n, 6), body twists; a zero twist keeps the demonstrated pose bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad]; raised to `COVARIANCE_FLOOR` where it is smaller.
     """
-    poses = displace(demonstration.poses, xi)
+    poses = displace_poses(demonstration.poses, xi)
     stated = floor_covariance(covariance + demonstration.human_error_covariance)
     return Observation(assembly, demonstration.start, poses, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
-def displace(poses: Array, xi: Array) -> Array:
+def displace_poses(poses: Array, xi: Array) -> Array:
     """`T exp(xi)` of poses (n, 4, 4) and body twists (n, 6); a zero twist keeps the pose bit for bit."""
     return np.where(np.any(xi, axis=1, keepdims=True)[..., None], poses @ pose.exp(xi), poses)
 
@@ -52,7 +52,7 @@ def add_shared_error(observation: Observation, *shared: SharedError) -> Observat
     """The observation with additional shared errors; their covariance is added to that of each operation."""
     stated = np.array(observation.covariance)
     for error in shared:
-        stated[list(error.operations)] += error.added(observation.poses)
+        stated[list(error.operations)] += error.covariances(observation.poses)
     return replace(observation, covariance=stated, shared=(*observation.shared, *shared))
 
 

@@ -33,7 +33,7 @@ _LARGEST_DEG = 180.01
 
 @final
 @dataclass(frozen=True, eq=False)
-class Sample:
+class ResidualSample:
     """Residuals to draw from, as errors in the frames of rays, [m, rad]; a shift acts in the observed frame."""
 
     inliers: Array
@@ -64,7 +64,7 @@ class EmpiricalNoise:
     are as frequent as measured. Residuals of inliers with an ambiguous rotation (symmetric parts) are left out.
     """
 
-    sample: Sample
+    sample: ResidualSample
     noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
 
@@ -87,9 +87,9 @@ class EmpiricalNoise:
         # Columns of chance: choice of the residual, outlier or not, missed or not; always drawn for all operations.
         chance = rng.random((n, 3))
         sign = rng.choice([-1.0, 1.0], (n, 1))
-        errors = _picked(sample.inliers, chance[:, 0])
+        errors = _select_rows(sample.inliers, chance[:, 0])
         if len(sample.outliers):
-            errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
+            errors = np.where(chance[:, 1:2] < sample.gross, _select_rows(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
         seen = observe_in_ray_frames(
             self.camera, self.noise_level, demonstration, assembly, sign * errors, sample.covariance, missed
@@ -103,56 +103,58 @@ def load_empirical_noise(path: Path, noise_level: NoiseLevel) -> EmpiricalNoise:
     Raises:
         InputError: The file is not valid; the message names the line.
     """
-    return EmpiricalNoise(_read_once(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
+    return EmpiricalNoise(_read_cached(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
 
 
-def residuals_text(residuals: Residuals) -> str:
+def format_residuals(residuals: Residuals) -> str:
     """The text of a file of residuals: one row per part in the truth, [mm, degrees], in the frame of its ray."""
     every = -(-len(residuals.where) // MOST_RESIDUALS)  # rounded up
     lines = [",".join(_COLUMNS)]
     kinds = np.select(
-        [~residuals.found, ~residuals.inlier, ~residuals.turn_known], [_MISSED, _OUTLIER, _TURNED], default=_INLIER
+        [~residuals.is_estimated, ~residuals.is_inlier, ~residuals.has_rotation_error],
+        [_MISSED, _OUTLIER, _TURNED],
+        default=_INLIER,
     )
     for k in range(0, len(residuals.where), every):
         numbers = np.concatenate([residuals.shift_mm[k], residuals.turn_deg[k]])
-        cells = [f"{x:.3f}" for x in numbers] if residuals.found[k] else [""] * 6
+        cells = [f"{x:.3f}" for x in numbers] if residuals.is_estimated[k] else [""] * 6
         lines.append(",".join([*map(str, residuals.where[k].tolist()), kinds[k], *cells]))
     return "\n".join(lines) + "\n"
 
 
-def read_residuals(path: str | Path) -> Sample:
+def read_residuals(path: str | Path) -> ResidualSample:
     """Read a file of residuals; see `load_empirical_noise`."""
     columns = {name: (name, 1.0) for name in _COLUMNS}
     errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
     for row in read_csv(path, columns, _COLUMNS):
         kind = row.text("kind")
         row.require(kind in _KINDS, "kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
-        errors[kind].append([] if kind == _MISSED else _error(row))
+        errors[kind].append([] if kind == _MISSED else _read_error(row))
     count = {kind: len(estimates) for kind, estimates in errors.items()}
     estimates = sum(count.values()) - count[_MISSED]
     require(
         count[_INLIER], f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals."
     )
-    return Sample(
-        inliers=_acting_where_seen(errors[_INLIER]),
-        outliers=_acting_where_seen(errors[_OUTLIER]),
+    return ResidualSample(
+        inliers=_convert_to_camera_errors(errors[_INLIER]),
+        outliers=_convert_to_camera_errors(errors[_OUTLIER]),
         missed=count[_MISSED] / (estimates + count[_MISSED]),
         gross=count[_OUTLIER] / estimates,
     )
 
 
 @lru_cache(maxsize=8)
-def _read_once(path: Path, _changed: int) -> Sample:
+def _read_cached(path: Path, _changed: int) -> ResidualSample:
     """Read a file of residuals; `_changed`, its modification time, is only a key of the cache."""
     return read_residuals(path)
 
 
-def _error(row: CsvRow) -> list[float]:
+def _read_error(row: CsvRow) -> list[float]:
     """The six error columns of a row, [mm, degrees]."""
     return [row.number(name, _LARGEST_MM if name.endswith("_mm") else _LARGEST_DEG) for name in _ERRORS]
 
 
-def _acting_where_seen(errors: list[list[float]]) -> Array:
+def _convert_to_camera_errors(errors: list[list[float]]) -> Array:
     """Convert residuals (n, 6) [mm, deg] to the errors (d, w) [m, rad] that `Camera.twists` takes.
 
     `Camera.twists` shifts a part that it turns by w by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d).
@@ -166,6 +168,6 @@ def _acting_where_seen(errors: list[list[float]]) -> Array:
     return np.concatenate([pose.log(T)[:, :3], measured[:, 3:]], axis=1)
 
 
-def _picked(rows: Array, chance: Array) -> Array:
+def _select_rows(rows: Array, chance: Array) -> Array:
     """Select one row (with repetition) for each uniform number of chance, (n,), 0 to 1."""
     return rows[np.minimum((chance * len(rows)).astype(np.int64), len(rows) - 1)]

@@ -1,6 +1,6 @@
 """Noise with tails, outliers and misses that were fitted to a pose estimator.
 
-It can be drawn, or its covariance can be stated for an existing observation (`restate`).
+It can be drawn, or its covariance can be stated for an existing observation (`restate_covariance`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -13,10 +13,10 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, Tails, make
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displacement import displace, floor_covariance, observe_displaced
+from apo_bench.perception.observation.models.displacement import displace_poses, floor_covariance, observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
-from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, find_last_seen
-from apo_bench.perception.observation.models.tails import Split
+from apo_bench.perception.observation.models.outliers import UNOBSERVED_DEVIATION, find_last_observed_poses
+from apo_bench.perception.observation.models.truncated_tails import TruncatedTails
 
 SMALLEST_SCALE = 1e-4
 """Least scale of a tail, relative to the limit."""
@@ -40,9 +40,9 @@ class MeasuredNoise:
 
     source: str
     """The estimator, the data and the origin of the numbers."""
-    shift_mm: Split
+    shift_mm: TruncatedTails
     """Distribution of the position errors of inliers."""
-    turn_deg: Split
+    turn_deg: TruncatedTails
     """Distribution of the rotation errors of inliers."""
     missed: float
     """Fraction of parts without an estimate."""
@@ -95,7 +95,7 @@ class FittedNoise:
         n = len(assembly)
         measured = self.measured
         errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
-        gross = _gross(measured, n, rng)
+        gross = _draw_gross_errors(measured, n, rng)
         chance = rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
@@ -103,12 +103,14 @@ class FittedNoise:
             self.camera, self.noise_level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
         tails = (
-            stated_tails(measured, self.noise_level, self.camera, seen.poses) if min(self.noise_level) > 0.0 else None
+            list_stated_tails(measured, self.noise_level, self.camera, seen.poses)
+            if min(self.noise_level) > 0.0
+            else None
         )
         return replace(seen, outliers=make_measured_model(measured.outliers), tails=tails)
 
 
-def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
+def restate_covariance(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
     """Return an observation with the covariances of measured noise in place of its own.
 
     Operations that were not observed keep their covariance.
@@ -117,11 +119,11 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
         camera.covariance(observation.poses, FittedNoise(measured, _AS_MEASURED, camera).covariance)
     )
     stated = np.where(observation.observed[:, None, None], stated, observation.covariance)
-    tails = stated_tails(measured, _AS_MEASURED, camera, observation.poses)
+    tails = list_stated_tails(measured, _AS_MEASURED, camera, observation.poses)
     return replace(observation, covariance=stated, shared=(), tails=tails)
 
 
-def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
+def list_stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
     """The tails that an observation states: those of inliers, in the frames of the rays to observed poses (n, 4, 4)."""
     shift = measured.shift_mm
     turn = measured.turn_deg
@@ -171,17 +173,17 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)
     xi = camera.twists(demonstration.poses, errors * scale)
-    stated = camera.covariance(displace(demonstration.poses, xi), covariance * np.outer(scale, scale))
+    stated = camera.covariance(displace_poses(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(noise_level) > 0.0)  # at level 0 nothing is missed
     poses = seen.poses.copy()
     stated = seen.covariance.copy()
-    poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
-    stated[missed] = np.diag(UNSEEN_DEVIATION**2)
+    poses[missed] = find_last_observed_poses(assembly, demonstration.start, poses, ~missed)[missed]
+    stated[missed] = np.diag(UNOBSERVED_DEVIATION**2)
     return replace(seen, poses=poses, covariance=stated, observed=~missed)
 
 
-def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
+def _draw_gross_errors(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Draw errors (n, 6) of outliers, [mm, deg]: log-uniform distances, uniform directions, uniform rotations."""
     # Normalised Gaussian vectors are uniform directions, normalised Gaussian quaternions uniform rotations.
     direction = rng.standard_normal((n, 3))

@@ -69,7 +69,7 @@ class PerPartNoise:
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))
-        factor = part_factors(assembly.solids, rng)
+        factor = draw_part_factors(assembly.solids, rng)
         each = np.array([factor[operation.main] for operation in assembly.operations])
         sigma = self.noise_level.sigma() * each.reshape(-1, 1)
         covariance = sigma[:, :, None] * np.eye(6) * sigma[:, None, :]
@@ -117,7 +117,7 @@ class HeavyTailedNoise:
         )
 
 
-def part_factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str, float]:
+def draw_part_factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str, float]:
     """Draw the factor of every part, one random number each, in alphabetical order of the parts."""
     names = sorted(parts)
     return dict(

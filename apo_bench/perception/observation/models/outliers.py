@@ -17,7 +17,7 @@ MISSES = 0.02
 """Fraction of operations that are not observed."""
 OUTLIER_TIMES = 10.0
 """Factor on the error of an outlier."""
-UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
+UNOBSERVED_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
 """(6,), standard deviation that is stated for a missed operation, [m, rad]."""
 
 
@@ -53,7 +53,7 @@ class OutlierNoise:
         ),
         notes=(
             f"A missed operation has the last observed pose of its part, or its start, with "
-            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods reject it",
+            f"{UNOBSERVED_DEVIATION[0]:g} m and {np.degrees(UNOBSERVED_DEVIATION[3]):g} deg: most methods reject it",
             "At level 0 nothing is missed",
         ),
     )
@@ -67,13 +67,13 @@ class OutlierNoise:
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
         poses = seen.poses.copy()
         covariance = seen.covariance.copy()
-        poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
-        covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
+        poses[missed] = find_last_observed_poses(assembly, demonstration.start, poses, ~missed)[missed]
+        covariance[missed] = np.diag(UNOBSERVED_DEVIATION**2)
         stated = make_measured_model(0.0, self.outliers, self.times) if self.times > 1.0 else None
         return replace(seen, poses=poses, covariance=covariance, observed=~missed, outliers=stated)
 
 
-def find_last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
+def find_last_observed_poses(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
     """The last observed pose of the main part of each operation, or its start pose, (n, 4, 4).
 
     Args:

@@ -43,7 +43,8 @@ class Residuals:
     where: NDArray[np.int64]
     """(n, 3): scene, image, object."""
     shift_mm: Array
-    """(n, 3), from the true to the estimated position: x, y, along the ray; see `beside` for the reference point."""
+    """(n, 3), from the true to the estimated position: x, y, along the ray; see `turned_in_place` for the reference
+    point."""
     turn_deg: Array
     """(n, 3), rotation vector from the true to the estimated rotation: about x, about y, about the ray."""
     trace_deg: Array
@@ -56,43 +57,43 @@ class Residuals:
     """Number of surplus estimates whose object is not in the image."""
     distance_mm: float = float("nan")
     """Median distance from the camera."""
-    beside: int = 0
+    turned_in_place: int = 0
     """Number of gross estimates that only turn a part about a fixed point off its origin; their shift is that of this
     point."""
 
     @cached_property
-    def found(self) -> NDArray[np.bool_]:
+    def is_estimated(self) -> NDArray[np.bool_]:
         return np.isfinite(self.shift_mm[:, 0])
 
     @cached_property
-    def inlier(self) -> NDArray[np.bool_]:
-        return np.nan_to_num(self.off_mm, nan=np.inf) < INLIER_MM
+    def is_inlier(self) -> NDArray[np.bool_]:
+        return np.nan_to_num(self.distance_from_truth_mm, nan=np.inf) < INLIER_MM
 
     @cached_property
-    def upright(self) -> NDArray[np.bool_]:
+    def is_upright(self) -> NDArray[np.bool_]:
         """(n,), inliers that are not turned. Turned ones are left out, since a symmetry axis off the origin of a part
         makes their shift meaningless."""
-        return self.inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
+        return self.is_inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
 
     @cached_property
     def round_objects(self) -> tuple[int, ...]:
         """Objects that seem to be rotationally symmetric: fewer than half of their inliers are upright, and rotation
         errors of all sizes occur."""
         parts = list[int]()
-        for part in np.unique(self.where[self.inlier, 2]).tolist():
-            angle = self.angle_deg[self.inlier & (self.where[:, 2] == part)]
+        for part in np.unique(self.where[self.is_inlier, 2]).tolist():
+            angle = self.angle_deg[self.is_inlier & (self.where[:, 2] == part)]
             between = (angle >= TURNED_DEG) & (angle < _GAP_DEG)
             if np.mean(angle < TURNED_DEG) < 0.5 and between.mean() > _IN_GAP:
                 parts.append(part)
         return tuple(parts)
 
     @cached_property
-    def turn_known(self) -> NDArray[np.bool_]:
+    def has_rotation_error(self) -> NDArray[np.bool_]:
         """(n,), upright estimates of objects that are not round, so that their rotation error is known."""
-        return self.upright & ~np.isin(self.where[:, 2], self.round_objects)
+        return self.is_upright & ~np.isin(self.where[:, 2], self.round_objects)
 
     @cached_property
-    def off_mm(self) -> Array:
+    def distance_from_truth_mm(self) -> Array:
         return np.asarray(np.linalg.norm(self.shift_mm, axis=1))
 
     @cached_property
@@ -118,40 +119,42 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     from scipy.spatial.transform import Rotation
 
     partner = match_rows(estimates, truth)
-    found = partner >= 0
+    is_estimated = partner >= 0
     n = len(partner)
-    in_images = _among(estimates.where[:, :2], truth.where[:, :2])
+    in_images = _occurs_in(estimates.where[:, :2], truth.where[:, :2])
     # BOP poses are in the frame of the camera, so its own pose is the identity. F^t takes errors into the ray's frame.
     there = np.tile(np.eye(4), (n, 1, 1))
     there[:, :3, 3] = truth.t_mm * 1e-3
-    F = Camera(np.eye(4)).frames(there)[found]
-    R = truth.R[found]
-    R_obs = estimates.R[partner[found]]
+    F = Camera(np.eye(4)).frames(there)[is_estimated]
+    R = truth.R[is_estimated]
+    R_obs = estimates.R[partner[is_estimated]]
     right = pose.nearest_rotations(R)
     turn = Rotation.from_matrix(pose.nearest_rotations(R_obs) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
-    moved = estimates.t_mm[partner[found]] - truth.t_mm[found]
-    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_obs))
-    shift[found] = np.einsum("nji,nj->ni", F, moved)
-    turned[found] = np.einsum("nji,nj->ni", F, turn)
+    moved = estimates.t_mm[partner[is_estimated]] - truth.t_mm[is_estimated]
+    turned_in_place, moved = _find_turned_in_place(
+        truth.where[is_estimated, 2], moved, right, pose.nearest_rotations(R_obs)
+    )
+    shift[is_estimated] = np.einsum("nji,nj->ni", F, moved)
+    turned[is_estimated] = np.einsum("nji,nj->ni", F, turn)
     # trace(R_obs R^t) = 1 + 2 cos(angle).
     trace = np.full(n, np.nan)
-    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_obs, R) - 1.0) / 2.0, -1.0, 1.0)))
+    trace[is_estimated] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_obs, R) - 1.0) / 2.0, -1.0, 1.0)))
     return Residuals(
         where=truth.where,
         shift_mm=shift,
         turn_deg=turned,
         trace_deg=trace,
-        score=np.where(found, estimates.score[partner], np.nan),
-        surplus=int(in_images.sum() - found.sum()),
-        absent=int(np.sum(in_images & ~_among(estimates.where, truth.where))),
+        score=np.where(is_estimated, estimates.score[partner], np.nan),
+        surplus=int(in_images.sum() - is_estimated.sum()),
+        absent=int(np.sum(in_images & ~_occurs_in(estimates.where, truth.where))),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
-        beside=int(beside.sum()),
+        turned_in_place=int(turned_in_place.sum()),
     )
 
 
-def _about_fixed_points(
+def _find_turned_in_place(
     objects: NDArray[np.int64], moved: Array, R: Array, R_obs: Array
 ) -> tuple[NDArray[np.bool_], Array]:
     """Find gross estimates that only turn a part about a fixed point, and compute their shifts at that point.
@@ -174,30 +177,30 @@ def _about_fixed_points(
     t = np.einsum("nji,nj->ni", R, moved)
     # |R - I| = 2 sqrt(2) sin(angle / 2) for the Frobenius norm.
     is_turned = np.linalg.norm(D, axis=(1, 2)) >= 2.0 * np.sqrt(2.0) * np.sin(np.radians(TURNED_DEG) / 2.0)
-    beside = np.zeros(len(off), dtype=np.bool_)
+    turned_in_place = np.zeros(len(off), dtype=np.bool_)
     shifts = np.array(moved)
     for each in np.unique(objects).tolist():
         of_it = objects == each
-        upright = of_it & (off < INLIER_MM) & ~is_turned
+        is_upright = of_it & (off < INLIER_MM) & ~is_turned
         left = np.flatnonzero(of_it & (off >= INLIER_MM) & is_turned)
         fewest = max(_FEWEST_ALIKE, _ALIKE * of_it.sum())
-        near = _NEAR * float(np.median(off[upright])) if upright.any() else 0.0
+        near = _NEAR * float(np.median(off[is_upright])) if is_upright.any() else 0.0
         while len(left) >= fewest:
             few = left[:_MOST_POINTS]
             points = -np.einsum("nij,nj->ni", np.linalg.pinv(D[few], rcond=1e-6), t[few])
-            kept = np.array([_point_off(D[left], t[left], c) < near for c in points])
+            kept = np.array([_shift_of_point(D[left], t[left], c) < near for c in points])
             agree = left[kept[np.argmax(kept.sum(axis=1))]]
             if len(agree) < fewest:
                 break
             c = np.linalg.lstsq(D[agree].reshape(-1, 3), -t[agree].reshape(-1), rcond=0.1)[0]
-            stands = left[_point_off(D[left], t[left], c) < INLIER_MM]
+            stands = left[_shift_of_point(D[left], t[left], c) < INLIER_MM]
             shifts[stands] = moved[stands] + (R_obs[stands] - R[stands]) @ c
-            beside[stands] = True
+            turned_in_place[stands] = True
             left = np.setdiff1d(left, np.union1d(stands, agree))
-    return beside, shifts
+    return turned_in_place, shifts
 
 
-def _point_off(D: Array, t: Array, c: Array) -> Array:
+def _shift_of_point(D: Array, t: Array, c: Array) -> Array:
     """The distance (n,) by which displacements move a point c (3,) of a part.
 
     Args:
@@ -207,7 +210,7 @@ def _point_off(D: Array, t: Array, c: Array) -> Array:
     return np.asarray(np.linalg.norm(D @ c + t, axis=1))
 
 
-def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
+def _occurs_in(rows: Any, known: Any) -> NDArray[np.bool_]:
     """(n,), True for each row that also occurs in `known`."""
     _, key = np.unique(np.concatenate([known, rows]), axis=0, return_inverse=True)
     key = key.reshape(-1)
@@ -219,7 +222,7 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     from scipy.optimize import linear_sum_assignment
 
     partner = np.full(len(truth.where), -1, dtype=np.int64)
-    for there, seen in _groups(truth.where, estimates.where):
+    for there, seen in _group_rows(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
             raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
         i, j = linear_sum_assignment(np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2))
@@ -227,7 +230,7 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     return partner
 
 
-def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
+def _group_rows(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
     """Yield the row indices of truth and estimates for each image and object that both contain."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
     there, seen = (_rows_by_key(keys) for keys in np.split(key.reshape(-1), [len(truth)]))

@@ -11,9 +11,9 @@ import numpy as np
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, make_flat_area
 from apo_bench.io import format_toml, write_file
-from apo_bench.scenario.parts.allowed import THINNEST_M, is_name
+from apo_bench.scenario.parts.limits import THINNEST_M, is_name
 from apo_bench.scenario.parts.making.body import Body
-from apo_bench.scenario.parts.stated import PART_SCHEMA
+from apo_bench.scenario.parts.stated_properties import PART_SCHEMA
 
 _ALIGNED = 1e-9
 """Tolerance within which directions and corners agree with the axes of the frame."""

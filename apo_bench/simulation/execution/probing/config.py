@@ -31,6 +31,14 @@ class CalibrationEstimate(Protocol):
         """Estimated true minus measured joint angles, (joints,), [rad]."""
 
     @property
+    def sags(self) -> bool:
+        """Whether the last column of a Jacobian is the displacement of the tip by a sag of 1 m, as a body twist."""
+
+    @property
+    def sag(self) -> float:
+        """Estimated height that the tip loses by the weight of the arm, [m]."""
+
+    @property
     def found(self) -> ProbingResult:
         """The estimates and their uncertainties, for the result of a replay."""
 
@@ -50,7 +58,7 @@ class CalibrationEstimate(Protocol):
 
         Args:
             T_world_tip: Pose that a robot without errors would have, (4, 4).
-            jacobian: Body Jacobian of the tip there, (6, joints); None: joint errors are left out.
+            jacobian: Body Jacobian of the tip there, (6, joints), with the sag if `sags`; None: both are left out.
         """
 
     def command(self, T_world_tip: Array, jacobian: Array | None) -> Array:
@@ -83,3 +91,5 @@ class ProbingConfig:
     """The sensor at the wrist, as in `parse_ft_noise`."""
     actions: tuple[str, ...] = PROBING_ACTIONS
     """The actions in use, of `PROBING_ACTIONS`."""
+    pads_m: float = 0.0
+    """Standard deviation of the middle between the pads along x of the tip, [m]; 0: it is not probed."""

@@ -24,6 +24,7 @@ from apo_bench.simulation.robot import (
     read_wrist,
     smooth_trajectory,
     translate,
+    zero_again,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -62,12 +63,14 @@ def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, g
         return grip
     T_before = robot.T
     # The pose of the part in the frame of the tip as estimated at the pick: `grip` is that of the real tip.
-    held = pose.inverse(grip.T_part_tip @ pose.inverse(probing.residual.tool))
+    held = pose.inverse(grip.T_part_tip @ pose.inverse(probing.residual.pads))
     robot.stage, robot.macro = "attach", "lay-flat"
     robot.follow(smooth_trajectory(robot.T, translate(t.flat.T @ grip.T_part_tip, UP, NEAR_M), LAY_SPEED))
     robot.stand()
+    robot.level()
     with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
         probing.wrist.hold(*compute_part_loads(robot.scene, {t.part: held}))
+        zero_again(robot, probing.wrist)
         touches = _press_flat(robot, probing, operation, t.flat, held)
         probing.wrist.hold()
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), _OFF))

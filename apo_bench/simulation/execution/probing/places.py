@@ -13,7 +13,7 @@ from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, flatten_face, make_plane_frame, measure_face_area, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles
+from apo_bench.simulation.execution.grasp_clearance import gripper_depth, list_obstacles
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M, upright_walls
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, translate
@@ -56,6 +56,10 @@ class TouchPlace(NamedTuple):
     """The plane of the face is normal . x = offset, [m]."""
     stand_off: float
     """Distance before the face at which the motion begins, [m]."""
+    opening: float = OPENING_M
+    """Opening of each finger, [m]."""
+    inner: bool = False
+    """Whether the inner side of one finger touches: a pad."""
 
 
 def usual_stand_off(T_world_tip: Array, normal: Array) -> float:
@@ -143,6 +147,28 @@ def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_
     return ()
 
 
+def inner_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
+    """Return two places on opposite walls of a fixed part, touched by the pads of the open hand around it, or none.
+
+    The fingers give way, so only the difference of both touches is used: it is twice the offset of the pads' middle.
+    The touches begin at the usual distance, since the hand is calibrated by then.
+    """
+    around = list_obstacles(plan.assembly.solids, plan.start, ())
+    for part, face in upright_walls(plan.assembly, plan.start):
+        for other in plan.assembly.solids[part].faces.values():
+            half = -0.5 * float(face.normal @ (other.outline[0] - face.outline[0]))
+            opening = half + STAND_OFF_M
+            if other.normal @ face.normal > -NOISE_LEVEL or opening > scene.arm.opening_m:
+                continue
+            both = [
+                _at_wall(scene, wall, plan.start[part], np.array([sign, 0.0]), usual_stand_off, opening, inner=True)
+                for wall, sign in ((face, 1.0), (other, -1.0))
+            ]
+            if all(_free(scene, place.T_world_tip, around, opening) for place in both):
+                return tuple(both)
+    return ()
+
+
 def _floor(plan: Plan) -> tuple[str, Face] | None:
     """Return part and face of the largest fixed face that points up, None if there is none."""
     up = [
@@ -168,13 +194,23 @@ def _with_room(
     return None
 
 
-def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandOff) -> TouchPlace:
+def _at_wall(
+    scene: Scene,
+    face: Face,
+    T: Array,
+    ahead: Array,
+    stand_off: StandOff,
+    opening: float = OPENING_M,
+    inner: bool = False,
+) -> TouchPlace:
     """Return a place in the middle of a wall, near its foot, touched by a side of the fingers.
 
     Args:
         T: Pose of the part with the wall, (4, 4), world.
         ahead: Outward direction of this side in the x-y plane of the tip, (2,): along x or y, of either sign.
         stand_off: Gives the distance at which the motion begins.
+        opening: Of each finger, [m].
+        inner: Whether only the rear finger touches, with its inner side.
     """
     n = T[:3, :3] @ face.normal
     corners = face.outline @ T[:3, :3].T + T[:3, 3]
@@ -185,9 +221,10 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
     # The tip looks down, so y = z x x = -up x x. The tip is turned so that `ahead` points into the wall.
     x = ahead[0] * into + ahead[1] * np.cross(into, -UP)
     R = np.column_stack([x, np.cross(-UP, x), -UP])
-    boxes = _boxes(scene)
+    boxes = list_gripper_boxes(scene.kinematics, opening)
     reach = float(_lowest(boxes)[0, 2])
     ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
+    ends = [box for box in ends if not inner or ahead @ box.center[:2] < 0.0]
     sides = [float(ahead @ box.center[:2] + np.abs(ahead) @ box.half[:2]) for box in ends]
     # The boxes that touch, and their extent across `ahead`.
     those = [box for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M]
@@ -203,7 +240,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
     touched += (d - n @ touched) * n
     there = frame(R, touched - R @ patch.mean(axis=0))
     away = stand_off(there, n)
-    return TouchPlace(translate(there, n, away), -n, patch, n, d, away)
+    return TouchPlace(translate(there, n, away), -n, patch, n, d, away, opening, inner)
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
@@ -220,10 +257,10 @@ def _lowest(boxes: Sequence[Box]) -> Array:
     return np.array([(x, y, reach) for x in (low[0], high[0]) for y in (low[1], high[1])])
 
 
-def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
+def _free(scene: Scene, T: Array, around: Sequence[Obstacle], opening: float = OPENING_M) -> bool:
     """Whether the hand has room straight down to a tip pose T, and the arm reaches both ends of this way."""
     lifts = np.arange(0.0, _LIFT_M, _CHECKED_M)[:, None] * UP
-    if gripper_depth(scene.kinematics, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
+    if gripper_depth(scene.kinematics, opening, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
     above = scene.kinematics.inverse(translate(T, UP, _LIFT_M), np.array(scene.arm.home))
     return above is not None and scene.kinematics.inverse(T, above) is not None

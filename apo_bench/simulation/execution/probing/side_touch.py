@@ -14,6 +14,7 @@ from apo_bench.simulation.robot import (
     read_wrist,
     smooth_trajectory,
     translate,
+    zero_again,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -46,10 +47,12 @@ def touch_side(
     robot.go(move_to_height(T, high), _CARRY)
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
+    robot.level()
     touches = []
     # Sleeping is off, so that a collision with a part at rest is noticed.
     with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
         probing.wrist.hold(*compute_part_loads(robot.scene, {t.part: held}))
+        zero_again(robot, probing.wrist)
         end = translate(robot.T, place.direction, 2.0 * STAND_OFF_M + BEYOND_M)
         left = press(
             robot, plan_steady_trajectory(robot.T, end, SPEED), place.direction, probing.touch_n, probing.wrist

@@ -15,7 +15,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.flat_placement import FlatPlacement
 from apo_bench.simulation.execution.probing.config import CalibrationEstimate, ProbingConfig
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot import Robot, RobotError, WristSensor, get_wrist, zero
+from apo_bench.simulation.robot import Robot, RobotError, WristSensor, compute_sag_per_metre, get_wrist, zero
 from apo_bench.simulation.scene import Scene
 
 TOUCH_SIGMA_M = 3e-5
@@ -27,6 +27,8 @@ SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 
 Closing tilts a round part by 0.3 degrees, and under the press it slides up between the pads.
 """
+PADS = -1
+"""Number of the grasp that stands for the pads of the open hand, as if the hand held them."""
 _CORNERS = 3  # iterations of the update, in each of which the touching corner of the hand is determined
 _FLAT_M = 1e-5  # a patch whose corners are level within this touches with its middle
 _OFF_SIGMAS = 3.0  # assumed greatest error of the tip, in standard deviations
@@ -52,10 +54,14 @@ class ProbingState:
         joints = np.zeros(len(scene.arm.joints))
         self.actions = probing.actions
         self.plan = plan
-        self.estimate = probing.estimate
+        self.has_unknown_pads = probing.pads_m > 0.0
+        """Whether the middle between the pads is uncertain, so that they are probed."""
+        pads = np.eye(6)[0] * probing.pads_m
+        self.estimate = probing.estimate.grasp(PADS, pads) if self.has_unknown_pads else probing.estimate
         self._config = probing
         self._wrist: WristSensor | None = None
         self._kinematics = scene.kinematics
+        self._sag_per_metre = compute_sag_per_metre(scene) if self.estimate.sags else np.zeros(1)
         self._error = error or RobotError(none, joints, none, np.tile(none, (len(plan.assembly), 1, 1)))
         self.residual = self._error
         """The drawn errors less those for which the commands compensate."""
@@ -96,16 +102,24 @@ class ProbingState:
         n = back[:3, :3] @ normal
         return n, float(n @ (back[:3, :3] @ point + back[:3, 3]))
 
-    def estimated_tip(self, robot: Robot) -> Array:
-        """Return the tip pose that the robot would estimate from its encoders without compensation, (4, 4), world."""
+    def estimated_tip(self, robot: Robot, holds: bool) -> Array:
+        """Return the tip pose that the robot would estimate from its encoders without compensation, (4, 4), world.
+
+        Args:
+            holds: Whether the middle between the pads, which hold a part or touch themselves, stands for the tip.
+        """
         left = self.residual
+        hand = left.pads if holds else left.tool
         measured = self._kinematics.forward(robot.encoders())
-        corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)
+        corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(hand)
         return self.estimate.command(corrected, self.jacobian(robot))
 
     def jacobian(self, robot: Robot) -> Array:
-        """Return the body Jacobian of the tip at the commanded joint angles, (6, joints)."""
-        return self._kinematics.jacobian(robot.q)
+        """Return the body Jacobian of the tip at the commanded joint angles, (6, joints), with the sag if stated."""
+        J = self._kinematics.jacobian(robot.q)
+        if not self.estimate.sags:
+            return J
+        return np.column_stack([J, -J @ (self._sag_per_metre * self._kinematics.gravity_torque(robot.q))])
 
     def learn(self, robot: Robot, touches: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
         """Update the estimate by touches of the hand; from now on commands compensate for it.
@@ -126,9 +140,18 @@ class ProbingState:
         tool = np.array(left.tool)
         tool[:3, 3] -= self.estimate.tool
         self.residual = replace(
-            left, hand_eye=left.hand_eye @ pose.inverse(E), tool=tool, joints=left.joints - self.estimate.encoders
+            left,
+            hand_eye=left.hand_eye @ pose.inverse(E),
+            tool=tool,
+            joints=left.joints - self.estimate.encoders,
+            sag=left.sag - self.estimate.sag * self._sag_per_metre,
+            finger=left.finger - 2.0 * self._found_pads(),
         )
-        robot.compensate(self.residual.joints)
+        robot.compensate(self.residual.joints, self.residual.sag)
+
+    def _found_pads(self) -> float:
+        """Return the estimated offset of the middle between the pads, along x of the tip, [m]."""
+        return float(self.estimate.held(PADS, np.eye(4))[0, 3]) if self.has_unknown_pads else 0.0
 
     def _cornered(self, touch: Touch, patch: Array) -> Touch:
         """Return the touch with the foremost corner of the patch by the present estimate, or its middle if level."""
@@ -143,7 +166,7 @@ class ProbingState:
 
     def T_tip_held(self, T_tip_part: Array) -> Array:
         """Return the pose of a held part in the frame of the arm's nominal tip, (4, 4), from that of the real tip."""
-        return np.asarray(pose.inverse(self.residual.tool) @ T_tip_part)
+        return np.asarray(pose.inverse(self.residual.pads) @ T_tip_part)
 
     def foot(self, robot: Robot, operation: int, flat: FlatPlacement, T_tip_part: Array, foot: Array) -> Touch:
         """Return the touch of the floor with one foot of the held part.
@@ -166,7 +189,7 @@ class ProbingState:
         """
         self.estimate = self.estimate.touch(*touches)
         held = self.estimate.held(operation, T_tip_part)
-        return Grip(pose.inverse(held) @ self.residual.tool, grip.half_width)
+        return Grip(pose.inverse(held) @ self.residual.pads, grip.half_width)
 
     def touch(
         self,
@@ -189,7 +212,7 @@ class ProbingState:
         """
         J = self.jacobian(robot)
         grasp, T_tip_part = held or (None, None)
-        return Touch(self.estimated_tip(robot), normal, offset, point, sigma_m, J, grasp, T_tip_part)
+        return Touch(self.estimated_tip(robot, held is not None), normal, offset, point, sigma_m, J, grasp, T_tip_part)
 
 
 def _less_common(estimate: CalibrationEstimate, touches: Sequence[Touch]) -> list[Touch]:

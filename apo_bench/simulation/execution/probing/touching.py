@@ -1,4 +1,4 @@
-"""Probe fixed parts with the closed, empty hand, first the floor, then walls, to calibrate the robot."""
+"""Probe fixed parts with the empty hand, first the floor, then walls, to calibrate the robot."""
 
 from functools import partial
 
@@ -11,10 +11,11 @@ from apo_bench.simulation.execution.probing.places import (
     ROOM_M,
     TouchPlace,
     floor_places,
+    inner_places,
     opposite_places,
     wall_places,
 )
-from apo_bench.simulation.execution.probing.state import ProbingState
+from apo_bench.simulation.execution.probing.state import PADS, ProbingState
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.simulation.hooks import TOUCHING
 from apo_bench.simulation.robot import (
@@ -27,6 +28,7 @@ from apo_bench.simulation.robot import (
     read_wrist,
     smooth_trajectory,
     translate,
+    zero_again,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -46,7 +48,8 @@ _HIGH_M = 0.1
 def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
     """Tare the wrist sensor and, with the action `touch`, touch the floor, then walls.
 
-    The calibration estimate is updated after the floor, after the walls, and after the two opposite touches.
+    The calibration estimate is updated after the floor, after the walls, after the two touches with opposite sides of
+    the hand, and after those with its two pads.
 
     Raises:
         ExecutionAborted: The hand collided, or a place is out of reach.
@@ -56,7 +59,9 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
     if "touch" not in probing.actions:
         return
     robot.fingers(OPENING_M)
-    for places in (floor_places, wall_places, opposite_places):
+    for places in (floor_places, wall_places, opposite_places, inner_places):
+        if places is inner_places and not probing.has_unknown_pads:
+            continue
         # Found with the present estimate, whose uncertainty sets how far before a face a touch begins.
         those = places(probing.plan, robot.scene, partial(_stand_off, robot, probing))
         touches = list[tuple[Touch, Array]]()
@@ -66,7 +71,7 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
             except ExecutionAborted as aborted:
                 aborted.why = _room(robot, probing, place)
                 raise
-        probing.learn(robot, touches, differ=places is opposite_places)
+        probing.learn(robot, touches, differ=places in (opposite_places, inner_places))
 
 
 def _stand_off(robot: Robot, probing: ProbingState, T: Array, normal: Array) -> float:
@@ -90,7 +95,8 @@ def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple
         The touch and the patch of the hand that touched, as a list of one; empty without contact.
     """
     # The commands compensate for the estimate, so the hand goes where only the remaining errors lead it.
-    T = probing.residual.hand_eye @ place.T_world_tip @ probing.residual.tool
+    hand = probing.residual.pads if place.inner else probing.residual.tool
+    T = probing.residual.hand_eye @ place.T_world_tip @ hand
     direction = probing.residual.hand_eye[:3, :3] @ place.direction
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
     robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, high), _OVER))
@@ -98,13 +104,18 @@ def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple
     if abs(measure_turn(rest, T) - measure_turn(rest, robot.T)) > _HALF_TURN:
         robot.go(move_to_height(rest, high), _OVER)
     robot.go(move_to_height(T, high), _OVER)
+    if place.opening != OPENING_M:
+        robot.fingers(place.opening)
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
+    robot.level()
     # Sleeping is off, so that a collision with a part at rest is noticed.
     with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
+        zero_again(robot, probing.wrist)
         end = translate(robot.T, direction, 2.0 * place.stand_off + BEYOND_M)
         left = press(robot, plan_steady_trajectory(robot.T, end, SPEED), direction, probing.touch_n, probing.wrist)
-        touched = probing.touch(robot, place.normal, place.offset, place.patch.mean(axis=0))
+        held = (PADS, np.eye(4)) if place.inner else None
+        touched = probing.touch(robot, place.normal, place.offset, place.patch.mean(axis=0), held)
         robot.follow(smooth_trajectory(robot.T, T, _BACK))
     robot.follow(smooth_trajectory(robot.T, move_to_height(T, T[2, 3] + _HIGH_M), _BACK))
     return [] if left is None else [(touched, place.patch)]

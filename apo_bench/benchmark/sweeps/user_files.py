@@ -1,0 +1,37 @@
+"""Find the user's own files that every node of a cluster needs."""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from apo_bench.perception.observation.noise_file import find_noise_path
+from apo_bench.scenario import Scenario, is_named
+from apo_bench.scenario.parts import read_part
+from apo_bench.trial.input_files import own_files
+
+
+def travelling_files(
+    loaded: Mapping[str, Scenario], arm_files: Iterable[Path], names: Iterable[str]
+) -> dict[str, Path]:
+    """Return the needed files below the current folder: relative path -> file. Files elsewhere are not copied.
+
+    The files are those of scenarios, their parts, the arm and noise models, and modules named as `module:name`, with
+    the modules that they import from the same folder.
+
+    Args:
+        loaded: Name or path of a scenario -> scenario.
+        arm_files: Files of the arm.
+        names: Methods, noise models, contact sources and the arm.
+    """
+    files = [*arm_files]
+    for source, scenario in loaded.items():
+        if not is_named(source):
+            files.append(Path(source))
+            for part in scenario.part_files.values():
+                files.extend(read_part(part).files)
+    for name in names:
+        noise = find_noise_path(name)
+        files.extend(own_files(name) if noise is None else (noise,))
+    here = Path.cwd()
+    whole = [Path(os.path.normpath(here / path)) for path in files]
+    return {path.relative_to(here).as_posix(): path for path in whole if path.is_relative_to(here)}

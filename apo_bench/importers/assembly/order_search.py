@@ -1,0 +1,204 @@
+"""Find an assembly order by disassembly: remove parts from the finished assembly, then reverse the removals.
+
+A part can be removed if two conditions hold: the straight path out of its contacts is free, also for the hand above;
+and the part would rest stably when put back. If no single part can be removed, a connected group is removed as a sub-
+assembly, which is put together next to the assembly first.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, combinations
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Contact, ContactMeasurements, Operation, Poses
+from apo_bench.geometry import Array, Solid, measure_drop, measure_extent, pose
+from apo_bench.importers.assembly.contact_search import find_contacts
+from apo_bench.importers.assembly.posed_parts import TABLE
+from apo_bench.importers.assembly.staging import find_stance
+from apo_bench.planning.insertion.arrival import plan_arrival
+from apo_bench.planning.insertion.macros import UP
+from apo_bench.planning.prediction.stability import BALANCED, measure_imbalance
+
+_FALLS_M = 7e-4
+"""Largest drop of a part that still counts as carried: a part in a hole drops by its play."""
+_CARRIES = 1e-3
+"""A contact carries weight if the vertical component of its normal is at least this."""
+_MOST_SETS = 4000
+"""The search ends after this number of sets of parts without an order."""
+_LARGEST_GROUP = 4  # parts in a sub-assembly
+
+
+class RemovalObstacle(NamedTuple):
+    """Why a part cannot be removed."""
+
+    passed: int
+    """How many tests of `_leave` the part passed, 0 to 3."""
+    reason: str
+
+
+class Placing(NamedTuple):
+    """One operation of the order that was found."""
+
+    moves: tuple[str, ...]
+    """The moved parts: the main part, which is held, then the carried ones."""
+    contacts: tuple[Contact, ...]
+    """Contacts between moved parts and the others, the face of the moved part first."""
+    at: Array
+    """(4, 4), goal of the main part in the frame of the assembly, [m]."""
+    why: str
+    """The reason as a phrase: the direction of insertion and the parts that carry the main part."""
+
+
+@final
+@dataclass
+class OrderSearch:
+    """Depth-first search for an assembly order, which remembers failed sets of parts and why parts were stuck."""
+
+    solids: Mapping[str, Solid]
+    """All parts by name, the table too."""
+    poses: Poses  # final poses
+    contacts: tuple[Contact, ...]
+    aside: Array
+    """(3,), offset from the assembly to the place of sub-assemblies, horizontal, [m]."""
+    wanted: Sequence[str] = ()
+    """The moved parts in the wanted order, which is followed where possible."""
+    failed: set[frozenset[str]] = field(default_factory=set)  # sets of parts that have no order
+    obstacles: dict[str, RemovalObstacle] = field(default_factory=dict)
+    """Part -> its obstacle in the attempt in which it passed most tests."""
+    left: frozenset[str] = frozenset()
+    """The smallest set of parts reached of which none could be removed."""
+
+    def find(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
+        """Return the operations that assemble all parts in order; None if there is no such order."""
+        return self._order_of(frozenset(self.solids), fixed | {TABLE})
+
+    def stuck(self) -> list[str]:
+        """Return one sentence for each part of the smallest stuck set: why the part cannot be removed."""
+        return [obstacle.reason for part, obstacle in self.obstacles.items() if part in self.left]
+
+    def _order_of(self, there: frozenset[str], base: frozenset[str]) -> tuple[Placing, ...] | None:
+        """Return the operations that lead from `base` to the parts in `there`; None if there is no order."""
+        if there == base:
+            return ()
+        if there in self.failed or len(self.failed) > _MOST_SETS:
+            return None
+        for placing in self._leaving(there, base):
+            before = self._order_of(there - set(placing.moves), base)
+            if before is not None:
+                # Never None here: `_leaving` tests it.
+                beside = self._put_together_beside(placing.moves) if len(placing.moves) > 1 else None
+                return (*before, *(beside or ()), placing)
+        self.failed.add(there)
+        return None
+
+    def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
+        """Yield the possible removals, the best first; groups only if no single part can be removed.
+
+        Args:
+            there: The parts that are assembled, the base too.
+            base: Parts that never leave.
+        """
+        free = [part for part in self.solids if part in there - base]
+        single = []
+        for part in free:
+            found = self._leave((part,), there)
+            if isinstance(found, Placing):
+                single.append(found)
+            elif found.passed >= self.obstacles.get(part, found).passed:
+                self.obstacles[part] = found
+        if single:
+            yield from sorted(single, key=self._lateness)
+            return
+        large_first = sorted(free, key=lambda part: -self.solids[part].volume)
+        for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
+            placing = self._leave(group, there) if self._is_connected(group) else None
+            if isinstance(placing, Placing) and self._put_together_beside(group) is not None:
+                yield placing
+        # Reached if no group led to an order either: remember the smallest stuck set for the error message.
+        if not self.left or len(free) < len(self.left):
+            self.left = frozenset(free)
+
+    def _lateness(self, placing: Placing) -> tuple[float, ...]:
+        """Return the sort key of a removal; the smallest is removed first, thus assembled last.
+
+        Parts late in the wanted order come first, then insertions from above, then the highest, then the smallest.
+        """
+        part = placing.moves[0]
+        low, _ = measure_extent(self.solids[part].pieces, self.poses[part][2, :3])
+        return (
+            -self.wanted.index(part) if part in self.wanted else 0,
+            "from above" not in placing.why,
+            -round(low + float(self.poses[part][2, 3]), 4),
+            self.solids[part].volume,
+        )
+
+    def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | RemovalObstacle:
+        """Return the operation that adds `moves` last to the other parts in `there`, or the obstacle.
+
+        Args:
+            moves: The parts that leave together, the main part first.
+            there: The parts that are assembled, `moves` too.
+        """
+        rest = [part for part in self.solids if part in there and part not in moves]
+        main = moves[0]
+        poses = self.poses
+        # Contacts of moved parts with the others, the moved face first.
+        pairs = (pair for a, b in self.contacts for pair in ((a, b), (b, a)))
+        contacts = tuple(Contact(a, b) for a, b in pairs if a.part in moves and b.part in rest)
+        others = ", ".join(dict.fromkeys(of.part for contact in contacts for of in contact if of.part in rest))
+        assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
+        # A part that is put back must have another one below and its weight over the parts that carry it. Then the
+        # contact macros give a straight path, which must be free.
+        if not contacts:
+            return RemovalObstacle(0, f"'{main}' touches nothing that would be there before it")
+        if (
+            min(measure_drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
+            > _FALLS_M
+        ):
+            return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
+        if (
+            measure_imbalance(ContactMeasurements(assembly), Operation(main, contacts, tuple(moves[1:])), poses)
+            > BALANCED
+        ):
+            return RemovalObstacle(
+                2, f"'{main}' would not keep its balance on {others}, which would be there before it"
+            )
+        arrival = plan_arrival(assembly, moves, contacts, poses)
+        if all(each.normal @ UP < _CARRIES for each in arrival.touched):
+            return RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
+        if not arrival.free:
+            return RemovalObstacle(3, f"'{main}' cannot leave {others}")
+        way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
+        along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
+        direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
+        return Placing(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
+
+    def _put_together_beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
+        """Return the operations that assemble a group next to the assembly, its main part on the table.
+
+        None if the main part does not stand stably on the table, or if the group has no order.
+        """
+        main = group[0]
+        stance = find_stance(self.solids[main], self.poses[main][:3, :3])
+        if not stance.stands or stance.rolls:
+            return None
+        # The same search for the group alone, on the table, each part at its place in the group.
+        shift = pose.at(self.aside + np.array([0.0, 0.0, stance.height_m - float(self.poses[main][2, 3])]))
+        poses = {part: shift @ self.poses[part] for part in group} | {TABLE: self.poses[TABLE]}
+        solids = {part: self.solids[part] for part in (*group, TABLE)}
+        inner = OrderSearch(solids, poses, find_contacts(solids, poses), self.aside)
+        base = frozenset((main, TABLE))
+        first = inner._leave((main,), base)
+        rest = inner._order_of(frozenset(solids), base)
+        return None if rest is None or not isinstance(first, Placing) else (first, *rest)
+
+    def _is_connected(self, group: Sequence[str]) -> bool:
+        """Whether contacts within the group connect each part of the group to the first one."""
+        known = {group[0]}
+        for _ in group:
+            for a, b in self.contacts:
+                if {a.part, b.part} <= set(group) and known & {a.part, b.part}:
+                    known |= {a.part, b.part}
+        return known == set(group)

@@ -1,0 +1,214 @@
+"""Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
+
+import os
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from shapely import Polygon
+
+from apo_bench.errors import InputError, require
+from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays
+from apo_bench.importers.cad.contact_faces import contact_faces
+from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
+from apo_bench.importers.cad.faces.regions import find_regions
+from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
+from apo_bench.importers.cad.meshes.shells import closed_solids
+from apo_bench.importers.cad.moments import moments_of_pieces, solid_moments
+from apo_bench.importers.cad.pieces.convex_cutting import Cut, cut
+from apo_bench.importers.cad.solids import RawSolid, clean_title, merge_copies, name_regions
+from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
+from apo_bench.scenario.parts import load_part
+from apo_bench.scenario.parts.face_checks import check_faces, supported
+from apo_bench.scenario.parts.limits import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
+from apo_bench.scenario.parts.making import Body, build_solid, write_part
+from apo_bench.scenario.parts.making.moments import Moments
+
+_RAYS = 720  # around the axis, by which the free radius of a hole is measured
+_LEAST_SHARE = 0.5
+"""The share of a flat face that must lie on pieces, if some pieces are hulls of free-form shapes."""
+_NEARLY_ALL = 0.98
+"""The share of a flat face that must lie on pieces otherwise."""
+_SLIVERS = 0.01
+"""Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
+# Why a filled hole can make no contact.
+_FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ImportedPart:
+    """A part that was imported and written."""
+
+    path: Path  # the part file
+    raw: RawSolid
+    solid: Solid  # the part as read back from its file
+    cut: Cut
+    refused: Mapping[str, str]
+    """Faces that can make no contact -> the reason."""
+    shares: Mapping[str, float]
+    """Flat face -> the share of its area that the pieces support; only faces below 1."""
+    free_mm: Mapping[str, float]
+    """Hole -> the largest radius free of pieces around its axis, [mm]."""
+
+
+def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
+    """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
+
+    Args:
+        unit: Unit of a mesh file; None: as stated or guessed.
+        fewest_sides: Smallest number of facets of a round face around a full turn in a mesh.
+
+    Raises:
+        InputError: The file cannot be read, or holds no closed solid.
+    """
+    if path.suffix.lower() in STEP_SUFFIXES:
+        return read_step(path, unit)
+    file, meshes = read_meshes(path, unit)
+    solids = merge_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
+    return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
+
+
+def import_solid(
+    raw: RawSolid,
+    name: str,
+    folder: Path,
+    source: str,
+    density: float = 1000.0,
+    others: Array | None = None,
+) -> ImportedPart:
+    """Import one solid: write `NAME.xml` and `NAME.toml`, and read the part back.
+
+    Args:
+        source: The name of the file, for messages and the part file.
+        density: [kg/m^3].
+        others: Points of other solids that come near, (k, 3), [mm], where pieces must be finest; None: unknown.
+
+    Raises:
+        InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
+    """
+    weight = 1e-9 * density * raw.mesh.volume
+    require(
+        LIGHTEST_KG <= weight <= HEAVIEST_KG,
+        f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; "
+        f"{1e3 * LIGHTEST_KG:g} g to {HEAVIEST_KG / 1e3:g} t are allowed.",
+    )
+    flats, rounds, refused = contact_faces(raw)
+    _check_faces(source, len(flats) + len(rounds))
+    try:
+        pieces = cut(raw, others)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    refused |= dict.fromkeys(pieces.filled, _FILLED)
+    possible_moments = _possible_moments(source, raw, pieces)
+    body = Body(pieces.pieces, tuple(flats), tuple(rounds), possible_moments[0])
+    body, shares = _keep_held_faces(_without(body, refused), _LEAST_SHARE if pieces.hulls else _NEARLY_ALL, refused)
+    _check_faces(source, len(body.flats) + len(body.rounds))
+    stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
+    title = clean_title(raw.name) if raw.name != name else ""
+    stated |= {"density": density, "source": source, "title": title, "licence": "as that file"}
+    for moments in possible_moments:
+        path = write_part(name, replace(body, moments=moments), folder, **stated)
+        try:
+            solid = load_part(path)
+            break
+        except InputError as error:
+            fault = error
+            path.unlink()
+            path.with_suffix(".toml").unlink(missing_ok=True)
+    else:  # no moments gave a part that could be read
+        why = str(fault).replace(f"{path.parent}{os.sep}", "").split("; ")[0].rstrip(".")
+        raise InputError(f"{source}: its convex pieces make no part ({why}); leave out fillets.") from fault
+    free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
+    return ImportedPart(path, raw, solid, pieces, refused, shares, free)
+
+
+def _check_faces(source: str, count: int) -> None:
+    """Raise InputError for a part without faces or with too many."""
+    require(count, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is.")
+    require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
+
+
+def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
+    """Return the moments to try: of the solid, then of its pieces if these omit no more than slivers, [m].
+
+    Raises:
+        InputError: Pieces have too many corners, or the pieces of a solid with only flat faces do not fill its volume.
+    """
+    corners = sum(len(piece.corners) for piece in pieces.pieces)
+    most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
+    require(
+        corners <= MOST_CORNERS_IN_ALL, f"{source}: the convex pieces of the part have {corners:,} corners; {most}."
+    )
+    moments = solid_moments(raw, pieces)
+    own = moments_of_pieces(pieces.pieces)
+    if all(region.kind == "plane" for region in raw.regions):
+        filled = 1e9 * own.size
+        require(
+            abs(filled - raw.mesh.volume) <= _SLIVERS * raw.mesh.volume,
+            f"{source}: the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3; "
+            "its surface may cross itself, so repair it in its CAD program.",
+        )
+    return [moments, own] if abs(own.size - moments.size) < _SLIVERS * own.size else [moments]
+
+
+def _without(body: Body, names: Container[str]) -> Body:
+    """Return the body without the named faces."""
+    flats = tuple(face for face in body.flats if face.name not in names)
+    rounds = tuple(face for face in body.rounds if face.name not in names)
+    return replace(body, flats=flats, rounds=rounds)
+
+
+def _keep_held_faces(body: Body, least: float, refused: dict[str, str]) -> tuple[Body, dict[str, float]]:
+    """Return the body with the faces that its pieces support, and the shares of partly supported flat faces.
+
+    A flat face is trimmed to the supported share if that is large enough.
+
+    Args:
+        least: Smallest share of a flat face that must be supported.
+        refused: Gets the omitted faces with the reason.
+    """
+    solid = build_solid("part", body)
+    flats = {face.name: face for face in body.flats}
+    shares: dict[str, float] = {}
+    faces: list[Face | RoundFace] = [*body.flats, *body.rounds]
+    for face in faces:
+        if not (reason := _fault(solid, face)):
+            continue
+        less = supported(face, solid.pieces) if isinstance(face, Face) else None
+        if less is not None and less[1] > least and not _fault(solid, less[0]):
+            flats[face.name], shares[face.name] = less
+        else:
+            refused[face.name] = reason
+    return _without(replace(body, flats=tuple(flats.values())), refused), shares
+
+
+def _fault(solid: Solid, face: Face | RoundFace) -> str:
+    """Return the reason why a face does not agree with the pieces; empty if it does."""
+    if isinstance(face, Face):
+        across = np.argsort(np.abs(face.normal))[:2]  # the two axes most nearly square to the normal
+        if not Polygon(face.outline[:, across], [hole[:, across] for hole in face.holes]).is_valid:
+            return "its outline crosses itself"
+    flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
+    try:
+        check_faces(replace(solid, faces=flat, rounds=wall), Path("part"))
+    except InputError as error:
+        return str(error).split(": ", 1)[-1].split("; ")[0]
+    return ""
+
+
+def _free_radius(solid: Solid, wall: RoundFace) -> float:
+    """Return the distance of the pieces from the axis of a hole, at its narrow end, [m]."""
+    angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
+    out = np.outer(np.cos(angle), wall.frame[:3, 0]) + np.outer(np.sin(angle), wall.frame[:3, 1])
+    share = 0.5  # height of the measurement, as a share of the length
+    if wall.kind == "cone":
+        share = 0.02 if wall.radii[0] < wall.radii[1] else 0.98
+    at = wall.point + (wall.span[0] + share * wall.length) * wall.axis
+    nearest = np.inf
+    for piece in solid.pieces:
+        enter, leave = intersect_rays(piece.planes, at, out)
+        nearest = min(nearest, np.maximum(enter, 0.0)[leave > 0.0].min(initial=np.inf))
+    return float(nearest)

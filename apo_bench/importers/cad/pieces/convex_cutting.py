@@ -1,0 +1,133 @@
+"""Cut a solid into convex pieces: along planes of reflex edges, then around round holes, [mm]."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import manifold3d
+import numpy as np
+from scipy.spatial import ConvexHull, cKDTree
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array, Hull
+from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
+from apo_bench.importers.cad.pieces.holes import bore_piece, least_pieces
+from apo_bench.importers.cad.pieces.hollow_parts import Beside
+from apo_bench.importers.cad.pieces.plane_cuts import convex_parts, cut_at_shoulders, snap_to_planes
+from apo_bench.importers.cad.pieces.shafts import as_cylinders, round_shafts
+from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
+from apo_bench.scenario.parts.limits import MOST_PIECES
+from apo_bench.scenario.parts.mass_checks import touching_groups
+
+_MOST_TRIANGLES = 20_000  # a body with more is simplified first
+_ENTRANCE_MM = 1.0  # a solid nearer to the ends of a hole than this is at its entrance
+_WEDGES = 300
+"""In an assembly, unused holes are filled if all holes would need more wedges than this."""
+_CRUMB = 1e-3
+"""Groups of pieces that touch no others are dropped if they are below this share of the volume of the solid."""
+_LOSS = 1e-3
+"""A piece counts as a hull of a free-form shape if its volume is off by more than this share."""
+
+
+class Cut(NamedTuple):
+    """The convex pieces of a solid."""
+
+    pieces: tuple[Hull, ...]
+    """Convex pieces, [m]."""
+    hulls: int
+    """The number of pieces that are hulls of hollow or free-form shapes, or were dropped."""
+    filled: tuple[str, ...] = ()
+    """Names of the round holes that are filled, as pieces around them would be too many."""
+
+
+def cut(raw: RawSolid, others: Array | None = None) -> Cut:
+    """Cut a solid into convex pieces: exact at flat faces, wedges that touch the fitted wall around round holes.
+
+    Args:
+        others: Points of other solids that come near, (k, 3), [mm]; None: unknown.
+
+    Raises:
+        InputError: The mesh makes no solid, or there are more pieces than a part may have.
+    """
+    body = convert_to_manifold(raw.mesh)
+    if body.status() != manifold3d.Error.NoError or body.is_empty():
+        raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
+    bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
+    shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
+    # Planes n . x = d.
+    flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
+    size = raw.mesh.extent
+    for bore in bores:  # fill the hole for now; `_bore` cuts it again with wedges
+        body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
+    if body.num_tri() > _MOST_TRIANGLES:
+        body = body.simplify(min(1e-3 * size, 0.01))
+    hulls = 0
+    outlines: list[Array] = []
+    beside = Beside(size, flats, None if others is None else cKDTree(others))
+    for part in cut_at_shoulders(convex_parts(body, beside), shafts, size):
+        coarse = merge_near_points(snap_to_planes(corners_of(part.body), part.planes, size))
+        if len(coarse) < 4 or not is_thick(coarse):
+            continue
+        fine = round_shafts(coarse, shafts)
+        corners = hull_corners(fine, flats, part.planes)
+        # A hull fills concave parts, and loses volume where corners are dropped; rounded walls are no error.
+        true = part.body.volume()
+        coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
+        hulls += abs(coarse_volume - true + kept_volume - fine_volume) > _LOSS * true
+        outlines.append(corners)
+    # Most important holes first: those that other solids come near, then the widest.
+    kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
+    # Unused holes, such as screw holes, are filled from the least important one if all of them need too many wedges.
+    while others is not None and kept and least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
+        kept.pop()
+    pieces = _bore(outlines, kept, flats)
+    while pieces is None and kept:
+        # Fill at least a quarter of the holes, the least important ones.
+        kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // least_pieces(kept)))]
+        pieces = _bore(outlines, kept, flats)
+    if pieces is None:
+        raise InputError(
+            f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
+            "out fillets and free surfaces."
+        )
+    whole, lost = _drop_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
+    return Cut(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept))
+
+
+def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int]:
+    """Drop groups of pieces of little volume that touch no other pieces.
+
+    Args:
+        most: Volume below which a group is dropped, [mm^3].
+
+    Returns:
+        The remaining pieces, and the number of dropped groups.
+    """
+    loose = sorted(touching_groups(pieces), key=len)[:-1]  # all groups but the one with most pieces
+    volumes = [sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group) for group in loose]
+    crumbs = [group for group, volume in zip(loose, volumes, strict=True) if volume < most]
+    dropped = set[int]().union(*crumbs)
+    return [piece for k, piece in enumerate(pieces) if k not in dropped], len(crumbs)
+
+
+def _bore(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:
+    """Return all pieces with the holes cut out, [m]; None if there are too many.
+
+    Args:
+        outlines: The corners of each piece, (k, 3), [mm].
+        flats: Planes of flat faces, (k, 4).
+    """
+    pieces: list[Hull] = []
+    for corners in outlines if least_pieces(bores) <= MOST_PIECES else ():
+        pieces += [Hull("", 1e-3 * each) for each in bore_piece(corners, bores, flats, MOST_PIECES - len(pieces))]
+        if len(pieces) > MOST_PIECES:
+            return None
+    return pieces or None
+
+
+def _is_near(bore: Region, others: Array | None) -> bool:
+    """Whether points of other solids, (k, 3), come into a hole or to its entrances."""
+    if others is None:
+        return False
+    height, distance, _ = bore.polar(others)
+    is_level = (height > bore.span[0] - _ENTRANCE_MM) & (height < bore.span[1] + _ENTRANCE_MM)
+    return bool((is_level & (distance < max(bore.radii))).any())
