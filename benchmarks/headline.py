@@ -111,7 +111,7 @@ def write(fidelity: Sequence[str]) -> None:
 def describe_run(folder: Path, rows: Sequence[TrialRecord]) -> dict[str, Any]:
     """Return versions, grids, code and times of a sweep, and the command that repeats it."""
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    times = read_timing(folder)
+    times = list(read_timing(folder))
     spent: dict[tuple[str, str], list[float]] = {}
     for t in times:
         spent.setdefault((t["scenario"], t["method"]), []).append(t["trial_s"])

@@ -1,17 +1,14 @@
 """The committed leaderboard: `python -m benchmarks.leaderboard`.
 
-Entries are those of `apo-bench score METHOD --out benchmarks/entries/METHOD.json`; rows lie in folders beside them,
-which are not committed.
+Entries are those of `apo-bench score METHOD --out benchmarks/entries/METHOD.json`; the same command continues an
+interrupted run. Records lie in folders beside them, which are not committed.
 
-Writes docs/results/leaderboard.md with its figure, and its first ten lines into the README. Tracks in which the three
-best methods lie within two points of each other, without `oracle`, no longer separate methods: they are regression
-tests and have `overall = false`; --marks lists them.
+Writes docs/results/leaderboard.md with its figure, and its first ten lines into the README.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.benchmark.scoring.entry import Entry
@@ -25,9 +22,6 @@ README = ROOT / "README.md"
 BEGIN = "<!-- written by benchmarks/leaderboard.py -->\n"
 END = "<!-- until here: leaderboard -->\n"
 FIRST = 10
-WITHIN = 2.0
-"""Points."""
-BEST = 3
 
 
 def entries() -> list[Entry]:
@@ -36,15 +30,6 @@ def entries() -> list[Entry]:
     if left_out:
         raise SystemExit("\n".join(left_out))
     return of
-
-
-def for_regression(of: Sequence[Entry]) -> Iterator[str]:
-    """Tracks that no longer separate the best methods, by name."""
-    for name in sorted({name for entry in of for name in entry.tracks}):
-        scores = [e.tracks[name].score for e in of if name in e.tracks and e.name != "oracle"]
-        best = sorted(scores, reverse=True)[:BEST]
-        if len(best) == BEST and round(best[0] - best[-1], 6) <= WITHIN:
-            yield name
 
 
 def first_lines() -> str:
@@ -60,13 +45,16 @@ def in_readme(text: str) -> str:
 
 
 def outcome(of: Sequence[Entry]) -> str:
-    """Two sentences: how good the best methods are that do not have the true poses, and the bound."""
-    scores = {line.entry.name: line.entry.overall[0] for line in ranked(of) if line.entry.overall}
+    """Return how good the best methods are that do not have the true poses, and the bound, or that trials are few."""
+    if any(entry.quick for entry in of):
+        return "The entries ran with `--quick`, one trial of each condition: the intervals are wide.\n\n"
+    scores = {line.entry.name: line.score for line in ranked(of) if line.score is not None}
     bound = scores.pop("oracle")
     (first, best), (second, next_best) = [*scores.items()][:2]
+    words = "{:.1f} ({:.1f} to {:.1f})"
     return (
-        f"`{first}` leads with a score of {best:.1f} of 100, before `{second}` with {next_best:.1f}. The bound is "
-        f"`oracle`, which has the true poses, with {bound:.1f}.\n\n"
+        f"`{first}` leads with a score of {words.format(*best)}, before `{second}` with {words.format(*next_best)}. "
+        f"The bound is `oracle`, which has the true poses, with {words.format(*bound)}.\n\n"
     )
 
 
@@ -80,11 +68,6 @@ def write_page(page: Path) -> None:
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--marks", action="store_true", help="list the tracks that are regression tests")
-    if asked.parse_args().marks:
-        print("\n".join(for_regression(entries())))
-        return
     write_page(PAGE)
     README.write_text(in_readme(README.read_text(encoding="utf-8")), encoding="utf-8")
 

@@ -202,6 +202,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             **sweep_meanings(),
             "trials": "seeds per condition, 1 to 1000000; default 100",
             "seed": "the first seed; default 0",
+            "independent_seeds": "whether each condition has other seeds, the same for every method; default false",
             "also": "further grids, one table each: `[[also]]`; keys that a grid lacks are those above",
         },
     },

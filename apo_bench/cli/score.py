@@ -25,7 +25,12 @@ from apo_bench.errors import InputError, require
 
 _OF_ESTIMATORS = "measured"
 """Track of a pose estimator where none is named."""
-_COLUMNS = {"track": "", "score": ".1f", "low": ".1f", "high": ".1f", "trials": "d", "executed": "d", "brier": ".3f"}
+_COLUMNS = {
+    "track": "",
+    **dict.fromkeys(("score", "low", "high"), ".1f"),
+    **dict.fromkeys(("trials", "executed"), "d"),
+    **dict.fromkeys(("brier", "reliability"), ".3f"),
+}
 """Columns of the scores, with their formats."""
 
 
@@ -33,7 +38,8 @@ def score_command(
     method: MethodArgument = None,
     *,
     track: Annotated[
-        list[str] | None, typer.Option(help="Track by name or file; may be repeated; default: all tracks.")
+        list[str] | None,
+        typer.Option(help="Track by name or file; may be repeated; default: those of the overall score."),
     ] = None,
     out: Annotated[
         Path | None, make_path_option("Write the entry: .json; its records are in a folder next to it.")
@@ -51,7 +57,7 @@ def score_command(
         make_path_option("Form of `part export`, filled in: trials of a real robot; nothing is simulated."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Run a few seeds of each condition, as a test.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Run a few trials of each condition, as a test.")] = False,
     secret_seed_file: Annotated[
         Path | None, make_path_option("Draw trials that nobody can draw without this file.")
     ] = None,

@@ -41,9 +41,12 @@ def sweep_command(
     out: Annotated[Path, make_path_option("Folder of the records; an interrupted sweep continues there.")],
     *,
     trials: Annotated[
-        int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")
+        int | None, typer.Option(help="Trials of each combination, by default all with the same seeds; default: 100.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
+    independent_seeds: Annotated[
+        bool, typer.Option("--independent-seeds", help="Draw other seeds for each condition, the same for all methods.")
+    ] = False,
     secret_seed_file: Annotated[
         Path | None,
         make_path_option(
@@ -69,7 +72,7 @@ def sweep_command(
     from apo_bench.benchmark.report.tables.methods import prediction_summary
     from apo_bench.cli.rates import print_rates
 
-    options |= {"trials": trials, "seed": seed}
+    options |= {"trials": trials, "seed": seed, "independent_seeds": independent_seeds or None}
     records = run_sweep(
         _read_grids(scenarios, {name: value for name, value in options.items() if value is not None}),
         out,

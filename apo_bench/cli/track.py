@@ -16,13 +16,14 @@ commands = make_group("track", _HELP)
 
 @commands.command("list", cls=Command)
 def track_list() -> None:
-    """List the tracks that come with the package.
+    """List the tracks that come with the package; those in brackets do not count in the overall score.
 
     Examples:
       apo-bench track list
       apo-bench score contact --track given --quick --out entry.json
     """
-    from apo_bench.benchmark.scoring.track import read_tracks
+    from apo_bench.benchmark.scoring.track import read_track, track_names
 
-    print_columns([(track.name, track.title) for track in read_tracks([])])
+    tracks = sorted(map(read_track, track_names()), key=lambda track: not track.overall)
+    print_columns([(track.name if track.overall else f"({track.name})", track.title) for track in tracks])
     typer.echo("\nOthers: FILE.toml")

@@ -18,7 +18,7 @@ from apo_bench.io.documents import (
 from apo_bench.io.figures import save_figure, use_figure_style
 from apo_bench.io.grouping import group_by
 from apo_bench.io.named_files import list_named_files
-from apo_bench.io.parquet import has_parquet, write_columns
+from apo_bench.io.parquet import has_parquet, write_columns, write_parts
 from apo_bench.io.processes import SAFE_PATH, set_environment
 from apo_bench.io.result_files import check_target, open_to_append, replace_file, write_file
 from apo_bench.io.safe_io import decode_text, open_file, read_bytes, read_lines, read_text
@@ -74,4 +74,5 @@ __all__ = (
     "write_columns",
     "write_csv",
     "write_file",
+    "write_parts",
 )

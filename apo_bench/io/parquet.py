@@ -1,6 +1,6 @@
 """Write tables as Parquet files with pyarrow."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
@@ -43,3 +43,35 @@ def write_columns(
     arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]  # without any value
     with replace_file(path) as out:
         parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")
+
+
+def write_parts(
+    kinds: Mapping[str, type | None],
+    distinct: Mapping[str, Sequence[Any]],
+    parts: Iterable[Mapping[str, Any]],
+    path: Path,
+) -> None:
+    """Write a table as Parquet part by part, so that a large one need not be in memory.
+
+    Args:
+        kinds: Column -> type of its numbers; None for other values.
+        distinct: Column of other values -> its distinct values, or None.
+        parts: Column -> its numbers in a part, a masked array, or the indices of its other values in `distinct`.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    of_kind = {float: pa.float64(), int: pa.int64(), bool: pa.bool_()}
+    values = {name: pa.array(each) for name, each in distinct.items()}
+    # without any value
+    values = {name: each.cast(pa.float64()) if pa.types.is_null(each.type) else each for name, each in values.items()}
+    schema = pa.schema([(name, values[name].type if kind is None else of_kind[kind]) for name, kind in kinds.items()])
+    with replace_file(path) as out, parquet.ParquetWriter(out, schema, compression="zstd") as file:
+        for part in parts:
+            arrays = [
+                values[field.name].take(pa.array(part[field.name]))
+                if field.name in values
+                else pa.array(part[field.name], field.type)
+                for field in schema
+            ]
+            file.write_table(pa.table(arrays, schema=schema))

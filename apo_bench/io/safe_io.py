@@ -12,6 +12,9 @@ from apo_bench.errors import InputError, add_article, require
 LARGEST_BYTES = 1_000_000
 
 
+_BUFFER = 1 << 20  # bytes that are read at a time
+
+
 @contextmanager
 def open_file(path: str | Path, kind: str) -> Iterator[BinaryIO]:
     """Open an ordinary file, or a link to one, for reading.
@@ -30,7 +33,7 @@ def open_file(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise _unreadable(path, kind, error) from error
     require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give {add_article(kind)}.")
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", _BUFFER) as file:
             yield file
     except OSError as error:
         raise _unreadable(path, kind, error) from error

@@ -10,7 +10,10 @@ from apo_bench.records.contact_sources import WRONG
 
 FOREIGN_ARMS = ("menagerie:", "robosuite:")
 """Prefixes of the arms of other collections; the name that follows is looked up there, and never imported."""
-FAILURES = ("flips", "stale", "swaps", "rays", "displaced-view")
+FAILURES = (
+    *("flips", "stale", "swaps", "rays", "displaced-view"),
+    *("latency", "depth-scale", "merged", "cad-scale", "mirrored-yaw"),
+)
 """Noise models in which a camera fails now and then; their stated covariance is that of an observation without failure.
 
 Rates may follow the name, as in `flips:p=0.1/r=0.5`.

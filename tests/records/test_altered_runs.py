@@ -26,7 +26,7 @@ def read(folder: Path) -> None:
     """All that `compare` does without writing, and the files that only `report` reads."""
     read_trials(folder)
     read_run(folder)
-    read_timing(folder)
+    list(read_timing(folder))
     json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
 
 

@@ -50,9 +50,15 @@ from apo_bench.benchmark.analysis.settings import (
     list_levels,
     list_settings,
 )
+from apo_bench.benchmark.analysis.stratified import (
+    MeanEstimate,
+    measure_mean_difference,
+    measure_mean_rate,
+    pool_estimates,
+)
 from apo_bench.benchmark.analysis.summary import Summary, summarise
 from apo_bench.benchmark.analysis.table_line import ALL, Line
-from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
+from apo_bench.benchmark.analysis.timing import read_timing, tabulate_timing
 
 __all__ = (
     "ALL",
@@ -65,6 +71,7 @@ __all__ = (
     "HalfLevel",
     "Interval",
     "Line",
+    "MeanEstimate",
     "PairedComparison",
     "Rate",
     "Records",
@@ -90,6 +97,9 @@ __all__ = (
     "list_settings",
     "make_settings_key",
     "make_sort_key",
+    "measure_mean_difference",
+    "measure_mean_rate",
+    "pool_estimates",
     "pool_rate",
     "rank_method",
     "read_timing",
@@ -100,7 +110,6 @@ __all__ = (
     "tabulate_effort",
     "tabulate_gaps",
     "tabulate_probing",
-    "tabulate_trial_times",
-    "tabulate_work",
+    "tabulate_timing",
     "tally",
 )

@@ -59,7 +59,7 @@ class HalfLevel:
 
 
 def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
-    """Estimate one half level per method and setting with at least two levels, in the order of the conditions.
+    """MeanEstimate one half level per method and setting with at least two levels, in the order of the conditions.
 
     The oracle has none, since noise does not affect it. On a curve a level has equal numbers of mm and degrees (no
     degrees with the depth camera); other conditions are left out.
@@ -69,7 +69,7 @@ def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
 
 
 def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLevel:
-    """Estimate the level at which success crosses one half from the results at rising levels."""
+    """MeanEstimate the level at which success crosses one half from the results at rising levels."""
     from scipy.optimize import isotonic_regression
 
     levels = np.array([c.noise_mm for c in cells])

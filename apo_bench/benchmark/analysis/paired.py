@@ -8,7 +8,7 @@ from typing import TypeVar, final
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
-from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, mean
+from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, compute_normal_quantile, mean
 from apo_bench.geometry import Array
 from apo_bench.records import TrialConfig, affects, knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
@@ -140,7 +140,7 @@ def mcnemar(only_first: int, only_second: int) -> float:
 
 
 @lru_cache(maxsize=65536)
-def compute_tango_interval(b: int, c: int, n: int) -> Interval:
+def compute_tango_interval(b: float, c: float, n: float) -> Interval:
     """Return Tango's 95 % score interval of a difference of paired proportions, (b - c) / n.
 
     It contains the differences at which Tango's score statistic is within the normal quantile z. Without a discordant
@@ -150,14 +150,13 @@ def compute_tango_interval(b: int, c: int, n: int) -> Interval:
     Args:
         b: Pairs in which only the first succeeded.
         c: Pairs in which only the second succeeded.
-        n: All pairs; without any the interval is -1 to 1.
+        n: All pairs, or an effective number of pairs, which is not whole; without any the interval is -1 to 1.
     """
     from scipy.optimize import brentq
-    from scipy.special import ndtri
 
     if n == 0:
         return Interval(-1.0, 1.0)
-    z = float(ndtri((1 + CONFIDENCE) / 2))
+    z = compute_normal_quantile()
     d = (b - c) / n
     # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
     # with c == n there is no root: the interval begins at -1
@@ -166,7 +165,7 @@ def compute_tango_interval(b: int, c: int, n: int) -> Interval:
     return Interval(float(low), float(high))
 
 
-def _score(b: int, c: int, n: int, delta: float) -> float:
+def _score(b: float, c: float, n: float, delta: float) -> float:
     """Return Tango's score statistic for a difference delta.
 
     q is the likeliest probability of a pair of kind c, given that difference.

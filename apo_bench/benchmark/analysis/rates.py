@@ -15,6 +15,7 @@ from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Mask, Trials, trials_of
 
 CONFIDENCE = 0.95
+_CLASSES = 10  # classes of predicted success
 Records = Trials | Iterable[Mapping[str, Any]]
 """Trials as columns, or as an iterable of records."""
 NOT_EXECUTED = ("observe", "correct", "predicted-success", "plan", "worker")
@@ -109,14 +110,30 @@ class ConditionResult(Condition):
 
 
 @lru_cache(maxsize=65536)
-def compute_wilson_interval(successes: int, trials: int) -> Interval:
-    """Return Wilson's 95 % score interval; 0 to 1 without trials."""
-    from scipy.stats import binomtest
+def compute_wilson_interval(successes: float, trials: float) -> Interval:
+    """Return Wilson's 95 % score interval; 0 to 1 without trials.
 
+    After E. B. Wilson, Probable inference, the law of succession, and statistical inference, JASA 22 (1927), 209-212.
+
+    Args:
+        trials: May be an effective number of trials, which is not whole.
+    """
     if trials == 0:
         return Interval(0.0, 1.0)
-    interval = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
-    return Interval(float(interval.low), float(interval.high))
+    z = compute_normal_quantile()
+    rate = successes / trials
+    middle = (rate + z**2 / (2.0 * trials)) / (1.0 + z**2 / trials)
+    half = z / (1.0 + z**2 / trials) * math.sqrt(rate * (1.0 - rate) / trials + (z / (2.0 * trials)) ** 2)
+    # the exact ends of all and of nothing are not left to rounding
+    return Interval(0.0 if successes == 0 else middle - half, 1.0 if successes == trials else middle + half)
+
+
+@lru_cache(maxsize=1)
+def compute_normal_quantile() -> float:
+    """Return the normal quantile of a two-sided 95 % interval, 1.96."""
+    from scipy.special import ndtri
+
+    return float(ndtri((1.0 + CONFIDENCE) / 2.0))
 
 
 def tally(records: Records) -> tuple[ConditionResult, ...]:
@@ -167,3 +184,21 @@ def _count(condition: Condition, trials: Trials) -> ConditionResult:
 def brier_score(counted: Trials) -> float | None:
     """Return the Brier score: the mean squared difference of predicted success and success over executed plans."""
     return mean((counted.number("predicted_success") - counted.number("success"))[was_executed(counted)] ** 2)
+
+
+def measure_reliability(counted: Trials) -> float | None:
+    """Return how far predicted success is from the success rate over executed plans: 0 is calibrated.
+
+    The plans are sorted into ten classes of equal width by their predicted success. The result is the mean squared
+    difference of predicted success and success rate in the classes (A. H. Murphy, A new vector partition of the
+    probability score, Journal of Applied Meteorology 12, 1973, 595-600). None without a prediction.
+    """
+    predicted = counted.number("predicted_success")
+    known = ~np.isnan(predicted) & was_executed(counted)
+    if not known.any():
+        return None
+    predicted = predicted[known]
+    classes = np.minimum((predicted * _CLASSES).astype(int), _CLASSES - 1)
+    apart = np.bincount(classes, predicted - counted.number("success")[known], minlength=_CLASSES)
+    plans = np.bincount(classes, minlength=_CLASSES)
+    return float((apart**2 / np.maximum(plans, 1)).sum() / len(predicted))

@@ -2,7 +2,9 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from apo_bench.benchmark.analysis import (
     ConditionResult,
@@ -17,8 +19,7 @@ from apo_bench.benchmark.analysis import (
     tabulate_effort,
     tabulate_gaps,
     tabulate_probing,
-    tabulate_trial_times,
-    tabulate_work,
+    tabulate_timing,
 )
 from apo_bench.benchmark.report.conclusions import answer
 from apo_bench.benchmark.report.failure_choice import Draw, sample
@@ -36,7 +37,7 @@ from apo_bench.benchmark.report.tables.methods import (
     work_table,
 )
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, has_parquet, write_columns, write_file
+from apo_bench.io import check_target, has_parquet, write_file, write_parts
 from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
@@ -50,6 +51,7 @@ FILES = ("conditions", "pairs", "half_levels", "detected", "gaps", "confusion", 
 _IF_ANY = ("detected", "probing", "times")
 _OURS = (*FILES, *PNG, "records", "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of tables and figures of a report, without endings; `difference_to_..` is one as well."""
+_PART = 100_000  # records in a part of the Parquet file
 PAGE = "report.html"
 TABLES = "tables"
 FIGURES = "figures"
@@ -106,7 +108,7 @@ def _write(
 ) -> Report:
     """Compute all tables and figures, and write them."""
     run = read_run(folder)
-    timing = read_timing(folder)
+    times, work = tabulate_timing(read_timing(folder))
     tables = {
         "conditions": condition_table(numbers.results),
         "pairs": pair_table(numbers.pairs),
@@ -117,8 +119,8 @@ def _write(
         "calibration": calibration_table(tabulate_calibration(trials)),
         "probing": probing_table(tabulate_probing(trials)),
         "effort": effort_table(tabulate_effort(trials)),
-        "times": time_table(tabulate_trial_times(timing)),
-        "work": work_table(tabulate_work(timing)),
+        "times": time_table(times),
+        "work": work_table(work),
     }
     lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))  # for the figures
     drawn = figures(numbers.results, numbers.pairs, list_settings(numbers.results), *lines)
@@ -165,5 +167,18 @@ def _remove_older(folder: Path, written: Collection[Path]) -> None:
 
 def _write_rows(trials: Trials, path: Path) -> Path:
     """Write the trials as Parquet, with the failure prediction in columns of its own."""
-    write_columns(list(COLUMNS), [trials.values(name) for name in COLUMNS], path)
+    distinct = {name: trials.coded(name).names for name, kind in COLUMNS.items() if kind is None}
+    starts = range(0, len(trials), _PART)
+    parts = (_values(trials.where(slice(start, start + _PART))) for start in starts)
+    write_parts(COLUMNS, distinct, parts, path)
     return path
+
+
+def _values(trials: Trials) -> dict[str, Any]:
+    """Return the numbers of each column as masked arrays, and the codes of the others."""
+    return {
+        name: trials.coded(name).codes
+        if kind is None
+        else np.ma.masked_array(np.nan_to_num(trials.number(name)).astype(kind), trials.is_null(name))
+        for name, kind in COLUMNS.items()
+    }

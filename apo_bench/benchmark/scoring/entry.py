@@ -13,7 +13,13 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.benchmark.analysis import Results, pool_rate
+from apo_bench.benchmark.analysis import (
+    Interval,
+    MeanEstimate,
+    measure_mean_difference,
+    measure_mean_rate,
+    pool_estimates,
+)
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import UNSHOWN, read_bytes, write_file
@@ -52,7 +58,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Mean over conditions of the success rate, in percent; a plan that is not executed is no success."""
     low: Percent  # lower end of the interval
     high: Percent
-    """Upper end of the 95 % interval over seeds."""
+    """Upper end of the 95 % interval of the score."""
     trials: Count
     """Number of trials that count."""
     executed: Count
@@ -61,28 +67,30 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Mean predicted success of the plans; None without predictions."""
     brier: Share | None
     """Mean squared difference of predicted success and success over executed plans."""
-    rows: Hash
+    reliability: Share | None
+    """Mean squared difference of predicted success and success rate in ten classes of predicted success."""
+    records: Hash
     """Hash of the records, in any order."""
     code: Hash
     """Hash of the source files and package versions that made them."""
     secret_seed: Hash | None
     """Hash of the secret seed of the trials; None for trials that anyone can draw."""
-    cells: Mapping[Text, Trials]
-    """Settings of a condition -> its trials, one letter each, by seed."""
+    conditions: Annotated[Mapping[Text, Trials], Meta(max_length=1000)]
+    """Settings of a condition -> its trials, one letter each, by their number."""
 
     def __post_init__(self) -> None:
-        trials = "".join(self.cells.values())
+        trials = "".join(self.conditions.values())
         counted = len(trials) - trials.count(EXCLUDED)
         require(
             self.trials == counted and trials.count(RIGHT) <= self.executed <= counted,
-            f"{self.trials} trials, {self.executed} of them executed, are stated, and its cells have {counted} with "
-            f"{trials.count(RIGHT)} successes",
+            f"{self.trials} trials, {self.executed} of them executed, are stated, and its conditions have {counted} "
+            f"with {trials.count(RIGHT)} successes",
         )
         stated = (self.score, self.low, self.high)
-        given = score_of(self.cells)
+        given = score_of(self.conditions)
         require(
             all(abs(a - b) < _TOLERANCE for a, b in zip(stated, given, strict=True)),
-            "the score {:.6g} ({:.6g} to {:.6g}) is stated, and its cells give {:.6g} ({:.6g} to {:.6g})".format(
+            "the score {:.6g} ({:.6g} to {:.6g}) is stated, and its conditions give {:.6g} ({:.6g} to {:.6g})".format(
                 *stated, *given
             ),
         )
@@ -90,11 +98,15 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             self.brier is None or (self.predicted_success is not None and self.executed > 0),
             "a Brier score is stated, and no plan with a predicted success was executed",
         )
+        require(
+            (self.brier is None) == (self.reliability is None),
+            "a Brier score and a reliability are stated together, or none of them is",
+        )
 
     @property
     def when_executed(self) -> float | None:
         """Success rate of the executed plans, in percent; None without any."""
-        right = sum(trials.count(RIGHT) for trials in self.cells.values())
+        right = sum(trials.count(RIGHT) for trials in self.conditions.values())
         return 100.0 * right / self.executed if self.executed else None
 
 
@@ -116,6 +128,8 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     """Whether it ran the few trials of `--quick`, which are no score."""
     versions: Annotated[Mapping[Name, Name], Meta(max_length=50)]
     """Versions of Python and of the packages that affect records."""
+    revision: Annotated[str, Meta(pattern=r"^([0-9a-f]{7,64}(-dirty)?)?\Z")]
+    """Git revision of the package; empty outside a checkout."""
     machine: Name
     tracks: Annotated[Mapping[Name, TrackScore], Meta(min_length=1, max_length=50)]
     real: bool = False
@@ -128,17 +142,47 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
     @property
     def overall(self) -> tuple[float, float, float] | None:
-        """Mean score over the tracks that count, in percent, and the ends of its 95 % interval; None without any.
-
-        The tracks are treated as independent: the half widths of their intervals add as squares.
-        """
-        those = [track for track in self.tracks.values() if track.overall]
+        """Mean score over the tracks that count, in percent, and the ends of its 95 % interval; None without any."""
+        those = [
+            MeanEstimate(track.score, Interval(track.low, track.high), 0.0)
+            for track in self.tracks.values()
+            if track.overall
+        ]
         if not those:
             return None
-        scores: Array = np.array([[track.score, track.low, track.high] for track in those])
-        mean = scores[:, 0].mean()
-        below, above = (np.linalg.norm(scores[:, 0] - scores[:, i]) / len(those) for i in (1, 2))
-        return float(mean), float(max(0.0, mean - below)), float(min(100.0, mean + above))
+        mean, (low, high), _ = pool_estimates(those)
+        return mean, max(0.0, low), min(100.0, high)
+
+
+def compare_entries(entry: Entry, reference: Entry) -> dict[str, MeanEstimate]:
+    """Return track -> difference of two entries in percentage points, first minus second, over the trials of both.
+
+    Tracks without a common trial are left out: another version, or another secret seed.
+    """
+    found = {}
+    for name, ours in entry.tracks.items():
+        theirs = reference.tracks.get(name)
+        if theirs is None or (ours.track, ours.secret_seed) != (theirs.track, theirs.secret_seed):
+            continue
+        apart = measure_mean_difference(
+            [
+                _subtract(trials, theirs.conditions[condition])
+                for condition, trials in ours.conditions.items()
+                if condition in theirs.conditions
+            ]
+        )
+        if apart is not None:
+            low, high = apart.interval
+            found[name] = MeanEstimate(
+                100.0 * apart.value, Interval(100.0 * low, 100.0 * high), 1e4 * apart.null_variance
+            )
+    return found
+
+
+def _subtract(first: str, second: str) -> Array:
+    """Return the first result minus the second one of the trials that count in both, (n,): 1, 0 or -1."""
+    pairs = [(a, b) for a, b in zip(first, second, strict=False) if EXCLUDED not in (a, b)]
+    return np.array([float(a == RIGHT) - float(b == RIGHT) for a, b in pairs])
 
 
 def check_name(called: str, name: str) -> None:
@@ -177,28 +221,22 @@ def read_entry(path: str | Path) -> Entry:
         ) from error
 
 
-def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
-    """Return the mean over conditions of the success rate, in percent, and the ends of its 95 % interval over seeds.
+def score_of(conditions: Mapping[str, str]) -> tuple[float, float, float]:
+    """Return the mean over conditions of the success rate, in percent, and the ends of its 95 % interval.
 
-    Conditions in which no trial counts are left out; without any other the result is 0, 0, 100. Trials at the same
-    position have the same seed, since all grids of a track begin with the same seed.
+    Conditions in which no trial counts are left out; without any other the result is 0, 0, 100.
+
+    Args:
+        conditions: Settings of a condition -> its trials, one letter each. All trials are independent.
     """
-    rates = [trials.count(RIGHT) / n for trials in cells.values() if (n := len(trials) - trials.count(EXCLUDED))]
-    if not rates:
-        return 0.0, 0.0, 100.0
-    score = 100.0 * sum(rates) / len(rates)
-    # the position of a trial stands for its seed
-    seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
-    success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
-    results = Results(np.arange(len(seeds)), seeds, success.astype(float))
-    low, high = pool_rate(results).interval
-    # the interval of the pooled rate, widened to contain the mean over conditions
-    return score, min(100.0 * low, score), max(100.0 * high, score)
+    known = [trials.replace(EXCLUDED, "") for trials in conditions.values()]
+    found = measure_mean_rate([np.array([float(letter == RIGHT) for letter in trials]) for trials in known])
+    return 100.0 * found.value, 100.0 * found.interval.low, 100.0 * found.interval.high
 
 
 def form_of(entry: Entry) -> dict[str, Any]:
     """Return an entry without its single trials, for `--json`."""
     form: dict[str, Any] = msgspec.to_builtins(entry)
     for track in form["tracks"].values():
-        del track["cells"]
+        del track["conditions"]
     return form

@@ -14,6 +14,7 @@ from apo_bench.formats.kit import FORM_COLUMNS
 from apo_bench.io import CsvRow, read_bytes, read_csv
 from apo_bench.records import Criteria
 from apo_bench.scenario import load_scenario
+from apo_bench.trial.fingerprint import git_revision
 
 _HEX = 16  # digits of a hash
 _LARGEST_MM = 1000.0  # largest length in a form
@@ -80,8 +81,8 @@ def _entry(
     scenario: str, criteria: Criteria, method: str, name: str, command: str, trials: str, form: str | Path
 ) -> Entry:
     """Return an entry with one track: the scenario with its thresholds, which does not count in the overall score."""
-    cells = {f"real|{scenario}|{criteria.clearance_mm:g} mm": trials}
-    score, low, high = score_of(cells)
+    conditions = {f"real|{scenario}|{criteria.clearance_mm:g} mm": trials}
+    score, low, high = score_of(conditions)
     counted = len(trials) - trials.count(EXCLUDED)
     task = json.dumps([scenario, msgspec.to_builtins(criteria)]).encode()
     track = TrackScore(
@@ -94,13 +95,25 @@ def _entry(
         executed=counted,
         predicted_success=None,
         brier=None,
-        rows=_digest(read_bytes(form, "form")),
+        reliability=None,
+        records=_digest(read_bytes(form, "form")),
         code=_digest(__version__.encode()),
         secret_seed=None,
-        cells=cells,
+        conditions=conditions,
     )
     tracks = {f"real-{scenario}": track}
-    return Entry(SCHEMA, name, method, command, False, {"apo_bench": __version__}, "real robot", tracks, real=True)
+    return Entry(
+        schema=SCHEMA,
+        name=name,
+        method=method,
+        command=command,
+        quick=False,
+        versions={"apo_bench": __version__},
+        revision=git_revision(),
+        machine="real robot",
+        tracks=tracks,
+        real=True,
+    )
 
 
 def _digest(content: bytes) -> str:

@@ -4,15 +4,13 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.analysis import CONDITION_FIELDS
-from apo_bench.benchmark.analysis.rates import brier_score, mean, was_executed
+from apo_bench.benchmark.analysis.rates import brier_score, mean, measure_reliability, was_executed
 from apo_bench.benchmark.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.benchmark.scoring.track import Track
 from apo_bench.benchmark.sweeps.sweep import run_sweep
@@ -20,10 +18,9 @@ from apo_bench.io import clean, group_by, shorten_text
 from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.trials import trials_of
+from apo_bench.trial.fingerprint import git_revision
 
 _HEX = 16  # digits of a hash
-# settings that identify a condition of an entry
-_SPELLED = tuple(name for name in CONDITION_FIELDS if name != "method")
 
 
 @check_arguments
@@ -63,13 +60,16 @@ def score(
     for track in tracks:
         said(track)
         records: list[TrialRecord] = []
+        conditions: dict[str, str] = {}
         for arm in track.arms:
             folder = Path(rows) / track.name / Path(arm).stem.replace(":", "_")
             folder.parent.mkdir(parents=True, exist_ok=True)
-            records += run_sweep(track.of(method, arm, quick), folder, command=command, **how)
+            made = run_sweep(track.of(method, arm, quick), folder, command=command, **how)
+            conditions |= _spell_conditions(made, track.find_trials(arm, quick))
+            records += made
             run = read_run(folder)
             versions = {"python": run["python"], **run["versions"]}
-        scores[track.name] = _score_track(track, records, run)
+        scores[track.name] = _score_track(track, conditions, records, run)
     return Entry(
         schema=SCHEMA,
         name=name,
@@ -77,16 +77,18 @@ def score(
         command=shorten_text(clean(command)),
         quick=quick,
         versions=dict(sorted(versions.items())),
+        revision=git_revision(),
         machine=platform.platform(),
         tracks=scores,
     )
 
 
-def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str, Any]) -> TrackScore:
+def _score_track(
+    track: Track, conditions: Mapping[str, str], records: Sequence[TrialRecord], run: Mapping[str, Any]
+) -> TrackScore:
     """Score a track from the records with all of its arms."""
     trials = trials_of(records)
     counted = trials.where(~np.isnan(trials.number("success")))
-    conditions = _spell_conditions(records)
     value, low, high = score_of(conditions)
     return TrackScore(
         track=track.hash,
@@ -98,22 +100,25 @@ def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str,
         executed=int(was_executed(counted).sum()),
         predicted_success=mean(counted.number("predicted_success")),
         brier=brier_score(counted),
-        rows=_digest(sorted(json.dumps(record, sort_keys=True) for record in records)),
+        reliability=measure_reliability(counted),
+        records=_digest(sorted(json.dumps(record, sort_keys=True) for record in records)),
         code=_digest([json.dumps({key: run[key] for key in ("versions", "content")}, sort_keys=True)]),
         secret_seed=run.get("secret_seed"),
-        cells=conditions,
+        conditions=conditions,
     )
 
 
-def _spell_conditions(records: Iterable[TrialRecord]) -> dict[str, str]:
-    """Return settings of a condition -> its trials, one letter each, by seed."""
+def _spell_conditions(records: Iterable[TrialRecord], trials: Mapping[int, tuple[str, int]]) -> dict[str, str]:
+    """Return settings of a condition -> its trials, one letter each, by their number.
+
+    Args:
+        trials: Seed -> condition of a trial, and its number.
+    """
     spelled = {True: RIGHT, False: WRONG, None: EXCLUDED}
-    conditions = group_by(
-        ("|".join([record["arm"], *(str(record.get(name)) for name in _SPELLED)]), record) for record in records
-    )
+    letters = group_by((trials[record["seed"]], spelled[record["success"]]) for record in records)
     return {
-        key: "".join(spelled[record["success"]] for record in sorted(conditions[key], key=itemgetter("seed")))
-        for key in sorted(conditions)
+        condition: "".join(letters[key][0] for key in sorted(own))
+        for condition, own in group_by((key[0], key) for key in letters).items()
     }
 
 

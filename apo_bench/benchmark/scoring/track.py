@@ -6,8 +6,10 @@ A track is a sweep file without methods, and a table of its own:
     schema = "apo-bench/track/1"
     title = "Poses of a camera that errs by a millimetre or so"
     overall = true        # whether it counts in the score over all tracks
-    quick_trials = 1      # seeds of each cell with --quick
+    quick_trials = 1      # trials of each condition with --quick
     arms = ["six_axis"]   # one sweep for each; without it, the usual arm
+
+Every condition has other seeds, the same for every method.
 """
 
 import hashlib
@@ -19,7 +21,7 @@ from typing import Annotated, Any, Literal, final
 from msgspec import Meta
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import SweepConfig
+from apo_bench.benchmark.sweeps.grid import AXES, SweepConfig, draw_seed, list_conditions
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.errors import require, unknown
 from apo_bench.io import FileTable, Text, convert_typed, read_bytes, read_plain
@@ -28,6 +30,8 @@ from apo_bench.resources import folder
 
 TABLE = "track"
 _HEX = 16
+_NAMED = tuple(info.name for info in AXES if info.name not in ("scenario", "method"))
+"""Settings that name a condition if they vary."""
 
 
 @final
@@ -39,7 +43,7 @@ class Track:
     title: str
     overall: bool
     """Whether it counts in the overall score; the others are for regression tests."""
-    quick_trials: int  # seeds per condition with --quick
+    quick_trials: int  # trials per condition with --quick
     arms: tuple[str, ...]
     hash: str
     """16 hexadecimal digits of a hash of the file."""
@@ -48,11 +52,30 @@ class Track:
 
     def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepConfig, ...]:
         """Return the grids of a method on one of the arms."""
-        own: dict[str, Any] = {"method": (method,), "arm": arm}
-        return tuple(
-            replace(grid, **own, trials=min(grid.trials, self.quick_trials) if quick else grid.trials)
-            for grid in self.grids
-        )
+        trials = min(self.grids[0].trials, self.quick_trials) if quick else self.grids[0].trials
+        seed = self.grids[0].seed + self.arms.index(arm)
+        own: dict[str, Any] = {"method": (method,), "arm": arm, "seed": seed, "trials": trials}
+        return tuple(replace(grid, **own) for grid in self.grids)
+
+    def find_trials(self, arm: str, quick: bool = False) -> dict[int, tuple[str, int]]:
+        """Return seed -> the condition of a trial in words, and the number of the trial in it."""
+        grids = self.of("oracle", arm, quick)
+        conditions = list(list_conditions(grids))
+        names = ["scenario", *(name for name in _NAMED if len({getattr(one, name) for one in conditions}) > 1)]
+        words = [", ".join(_describe(one, name) for name in names) for one in conditions]
+        prefix = f"{arm}: " if len(self.arms) > 1 else ""
+        return {
+            draw_seed(grids[0].seed, number, trial): (prefix + text, trial)
+            for number, text in enumerate(words)
+            for trial in range(grids[0].trials)
+        }
+
+
+def _describe(condition: SweepConfig, name: str) -> str:
+    """Return a setting of a condition in words; the scenario is its name."""
+    value = (*getattr(condition, name), "the scenario's")[0]
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if name == "scenario" else f"{name} {text}"
 
 
 class TrackTable(FileTable, frozen=True, kw_only=True):
@@ -107,11 +130,12 @@ def read_track(given: str | Path) -> Track:
     require(TABLE in top, f"{path}: a table [{TABLE}] is needed.")
     require("method" not in top, f"{path}, method: a track has no method, its entrants are; remove the key.")
     table = convert_typed(top[TABLE], TrackTable, f"{path}, {TABLE}")
-    grids = read_sweep(path, besides=(TABLE,))
-    require(
-        len({grid.seed for grid in grids}) == 1,
-        f"{path}: all grids of a track begin with the same seed; remove the key 'seed' below [[also]].",
-    )
+    grids = read_sweep(path, {"independent_seeds": True}, besides=(TABLE,))
+    for name in ("seed", "trials"):
+        require(
+            len({getattr(grid, name) for grid in grids}) == 1,
+            f"{path}: all grids of a track have the same {name}; remove the key '{name}' below [[also]].",
+        )
     return Track(
         name=path.stem,
         title=table.title,
@@ -125,12 +149,13 @@ def read_track(given: str | Path) -> Track:
 
 @check_arguments
 def read_tracks(names: Sequence[str]) -> tuple[Track, ...]:
-    """Read tracks by name or file; without names, all that come with the package.
+    """Read tracks by name or file; without names, those of the package that count in the overall score.
 
     Raises:
         InputError: As `read_track`, or two tracks have the same name.
     """
-    tracks = tuple(read_track(name) for name in names or track_names())
+    tracks = tuple(map(read_track, names or track_names()))
+    tracks = tuple(track for track in tracks if names or track.overall)
     called = [track.name for track in tracks]
     for name in called:
         require(called.count(name) == 1, f"the track {name} was given twice; name every track once.")

@@ -9,6 +9,7 @@ import shutil
 import signal
 import socket
 import tempfile
+import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -28,6 +29,8 @@ _TOUCH_S = 5.0
 """Time limit to connect to the port of a cluster."""
 _AHEAD = 2
 """Number of tasks per CPU that are submitted: one runs, the others wait."""
+_TASK_S = 4.0
+"""Seconds that a task lasts: long against what Ray takes to hand out a task, short against an interruption."""
 _OBJECT_STORE = 100 * 2**20
 """Size in bytes of the object store of a cluster that is started here; records are small."""
 _SETTINGS = {
@@ -97,15 +100,20 @@ def run_on_cluster(
     _join(address, workers, files)
     task = ray.remote(num_cpus=1)(run_on_node)
     at_once = workers or _AHEAD * int(ray.cluster_resources().get("CPU", 1))
+    inputs_there = ray.put(inputs)
     waiting = deque(batches)
-    running: list[Any] = []
+    running: dict[Any, int] = {}  # task -> number of its batches
+    many = 1
     try:
         while waiting or running:
             while waiting and len(running) < at_once:
-                running.append(task.remote(waiting.popleft(), inputs, limit_s))
-            done, running = ray.wait(running)
-            for ended in ray.get(done[0]):
-                emit(*ended)
+                share = [waiting.popleft() for _ in range(count_batches(many, len(waiting), at_once))]
+                running[task.remote(share, inputs_there, limit_s)] = len(share)
+            (done,), _ = ray.wait(list(running))
+            ended, took_s = ray.get(done)
+            many = max(1, int(_TASK_S * running.pop(done) / took_s))
+            for each in ended:
+                emit(*each)
     except RayTaskError as error:
         kind = InputError if isinstance(error.cause, InputError) else RuntimeError  # the exception of the task itself
         raise kind(str(error.cause)) from error
@@ -118,14 +126,24 @@ def run_on_cluster(
         ray.shutdown()
 
 
-def run_on_node(batch: Batch, inputs: SweepInputs, limit_s: float) -> list[Ended]:
-    """Run a batch in a child process of a node, so that a crash does not end the worker process of Ray."""
+def count_batches(many: int, waiting: int, at_once: int) -> int:
+    """Return the number of batches of the next task: `many`, or fewer towards the end, so that no node waits long."""
+    return max(1, min(many, waiting // at_once))
+
+
+def run_on_node(batches: Sequence[Batch], inputs: SweepInputs, limit_s: float) -> tuple[list[Ended], float]:
+    """Run batches in a child process of a node, so that a crash does not end the worker process of Ray.
+
+    Returns:
+        Records and timings, and the seconds that the batches took.
+    """
     import ray
 
     node = {"node": ray.get_runtime_context().get_node_id()}
     ended: list[Ended] = []
-    run_in_pool(_pool_of_node(), [batch], inputs, 1, limit_s, lambda record, wall: ended.append((record, wall | node)))
-    return ended
+    start = time.perf_counter()
+    run_in_pool(_pool_of_node(), batches, inputs, 1, limit_s, lambda record, wall: ended.append((record, wall | node)))
+    return ended, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, make_dataclass
+from dataclasses import asdict, dataclass, field, make_dataclass, replace
 from itertools import product
 from numbers import Integral, Real
 from typing import Any, final
+
+import numpy as np
 
 from apo_bench.errors import require, shown
 from apo_bench.io import UNSHOWN, group_by
@@ -34,6 +36,12 @@ AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), NOIS
 _MAY_BE_EMPTY = ("clearance_mm", "noise")  # settings whose default depends on the scenario or the pose source
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """The settings that all trials of a sweep share."""
+EACH = ":*"
+"""Ending of a scenario, `generated:FAMILY:*`, that draws another assembly for each trial."""
+_MOST_GENERATED = 10**15
+"""The seed of a generated scenario has at most 15 digits."""
+_UNUSED_BITS = 11
+"""A drawn seed has 53 of 64 bits, so that every JSON reader keeps it exact."""
 # the scenario and its clearance are combined separately
 _VARIED = tuple(info for info in AXES if info.name not in ("scenario", "clearance_mm"))
 Batch = tuple[TrialConfig, ...]
@@ -87,6 +95,9 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     """Number of trials of each combination."""
     seed: int = field(default=0, kw_only=True)
     """The first seed; the others follow."""
+    independent_seeds: bool = field(default=False, kw_only=True)
+    """Whether each condition has other seeds, the same for every method, drawn from `seed`; by default
+    all combinations have the same seeds."""
 
     def __post_init__(self) -> None:
         if self.noise_mm != () or self.noise_deg != ():
@@ -144,12 +155,21 @@ def _plain(value: Any) -> Any:
 def check_grids(grids: Sequence[SweepConfig]) -> None:
     """Raise an `InputError` unless the grids can be one sweep.
 
-    There must be a grid, all must share arm, time step and fidelity, and there may not be too many trials.
+    There must be a grid, all must share arm, time step and fidelity, and there may not be too many trials. Independent
+    seeds are drawn from one seed.
     """
     require(grids, "no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
         require(len(values) == 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
+    drawn = {(grid.independent_seeds, grid.seed * grid.independent_seeds) for grid in grids}
+    for grid in grids:
+        each = next((name for name in grid.scenario if name.endswith(EACH)), None)
+        require(
+            each is None or (grid.independent_seeds and each.startswith("generated:")),
+            f"the scenario '{each}' was given; give `generated:FAMILY:*`, with independent seeds.",
+        )
+    require(len(drawn) == 1, "independent_seeds and their seed are those of the whole sweep; give each of them once.")
     most = sum(grid.trials * math.prod(max(1, len(getattr(grid, info.name))) for info in AXES) for grid in grids)
     require(
         most <= MOST_TRIALS,
@@ -164,7 +184,7 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
     """
-    loaded = {source: load_scenario(source) for grid in grids for source in grid.scenario}
+    loaded = {source: load_scenario(source) for source in _list_sources(grids)}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
         require(
@@ -181,7 +201,7 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
 def units(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None = None
 ) -> Iterator[Batch]:
-    """Yield all trials of a sweep, each once, in batches ordered by seed.
+    """Yield all trials of a sweep, each once, in batches ordered by seed, or by the number of the trial.
 
     By this order an interrupted sweep has about equally many trials of each condition.
 
@@ -189,6 +209,9 @@ def units(
     Its record has noise level 0, human error scale 0, and the first noise model or pose source. For other methods,
     settings without effect have their defaults.
     """
+    if any(grid.independent_seeds for grid in grids):
+        yield from _independent_units(grids, loaded, secret_seed)
+        return
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]  # grids that have this seed
         for source, scenario in loaded.items():
@@ -205,12 +228,82 @@ def units(
             yield from (tuple(dict.fromkeys(trials)) for trials in together.values())
 
 
+def draw_seed(seed: int, condition: int, trial: int) -> int:
+    """Return the seed of a trial that is independent of those of all other trials and conditions, below 2^53.
+
+    Args:
+        seed: The seed of the sweep.
+        condition: Number of the condition, from 0.
+        trial: Number of the trial in its condition, from 0.
+    """
+    drawn = np.random.SeedSequence(seed, spawn_key=(condition, trial)).generate_state(1, np.uint64)
+    return int(drawn[0]) >> _UNUSED_BITS
+
+
+def list_conditions(grids: Sequence[SweepConfig]) -> dict[SweepConfig, list[SweepConfig]]:
+    """Return each condition of a sweep, in the order of its number -> the grids of one condition that have it.
+
+    A condition is a combination of all settings but the method; as a key it has one method and one trial.
+    """
+    own: dict[str, Any] = {"method": ("oracle",), "trials": 1}
+    return group_by((replace(one, **own), one) for grid in grids for one in _split(grid))
+
+
+def _split(grid: SweepConfig) -> Iterator[SweepConfig]:
+    """Yield a grid for each combination of all settings but the method."""
+    names = [info.name for info in AXES if info.name != "method"]
+    each: list[list[tuple[Any, ...]]] = [[(value,) for value in getattr(grid, name)] or [()] for name in names]
+    for values in product(*each):
+        own: dict[str, Any] = dict(zip(names, values, strict=True))
+        yield replace(grid, **own)
+
+
+def _independent_units(
+    grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None
+) -> Iterator[Batch]:
+    """Yield all trials of a sweep with independent seeds; those of one condition and number have one seed."""
+    conditions = list(list_conditions(grids).values())
+    for trial in range(max(grid.trials for grid in grids)):
+        for number, ones in enumerate(conditions):
+            seed = draw_seed(grids[0].seed, number, trial)
+            batch: dict[TrialConfig, None] = {}
+            for one in ones:
+                source = _draw_source(one.scenario[0], seed)
+                same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
+                clearances = one.clearance_mm or (loaded[source].clearance_mm,)
+                if trial < one.trials:
+                    batch |= dict.fromkeys(_trials(one, same | {"clearance_mm": clearances[0]}))
+            if batch:
+                yield tuple(batch)
+
+
+def _list_sources(grids: Sequence[SweepConfig]) -> Iterator[str]:
+    """Yield the scenarios of all trials by name or path, with those that a seed draws."""
+    if not any(grid.independent_seeds for grid in grids):
+        yield from (source for grid in grids for source in grid.scenario)
+        return
+    for number, ones in enumerate(list_conditions(grids).values()):
+        given = ones[0].scenario[0]
+        trials = max(one.trials for one in ones) if given.endswith(EACH) else 1
+        for trial in range(trials):
+            yield _draw_source(given, draw_seed(ones[0].seed, number, trial))
+
+
+def _draw_source(given: str, seed: int) -> str:
+    """Return a scenario: with the ending `:*`, which needs independent seeds, another one for each trial."""
+    return f"{given.removesuffix('*')}{seed % _MOST_GENERATED}" if given.endswith(EACH) else given
+
+
 def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
     """Return the grids for `run.json`, with scenarios by name and clearances filled in."""
     forms = []
     for grid in grids:
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
-        own = {loaded[source].name: loaded[source].clearance_mm for source in grid.scenario}
+        names = {source: loaded[source].name if source in loaded else source for source in grid.scenario}
+        own = {
+            name: loaded[source].clearance_mm if source in loaded else TrialConfig.clearance_mm
+            for source, name in names.items()
+        }
         clearances = {name: list(grid.clearance_mm or (clearance,)) for name, clearance in own.items()}
         forms.append({**values, "scenario": list(own), "clearance_mm": clearances})
     return forms

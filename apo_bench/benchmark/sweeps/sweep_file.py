@@ -29,7 +29,7 @@ _SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
 """Keys that take one value or several."""
 _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """Key -> setting that the whole sweep shares; these keys stand at the top of the file only."""
-SWEEP_KEYS = (*_SEVERAL, "trials", "seed")
+SWEEP_KEYS = (*_SEVERAL, "trials", "seed", "independent_seeds")
 _VALUES = [(key, Any, UNSET) for key in SWEEP_KEYS]  # every key is optional
 AlsoTable = msgspec.defstruct("AlsoTable", _VALUES, bases=(FileTable,), kw_only=True)
 """The table `[[also]]`: a further grid."""

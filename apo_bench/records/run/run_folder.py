@@ -21,6 +21,7 @@ from apo_bench.records.run.validation import record_of, unwritable
 from apo_bench.records.secret_seed import check_same_secret_seed
 
 CHUNK = 1 << 16  # bytes that are read at a time
+TRIALS_KIND = "table of trials"  # in messages
 
 
 @final
@@ -96,12 +97,22 @@ def read_records(folder: str | Path) -> list[TrialRecord]:
 
 def each_record(folder: str | Path) -> Iterator[TrialRecord]:
     """Yield the records of a folder one by one, so that a reader need not hold all of them."""
+    path = find_trials(folder)
+    yield from (record_of(line, f"{path}, line {number}") for number, line in read_lines(path, TRIALS_KIND))
+
+
+def find_trials(folder: str | Path) -> Path:
+    """Return the file of the records of a folder.
+
+    Raises:
+        InputError: There is no such file.
+    """
     path = Path(folder) / "trials.jsonl"
     require(
         path.exists(),
         f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote.",
     )
-    yield from (record_of(line, f"{path}, line {number}") for number, line in read_lines(path, "table of trials"))
+    return path
 
 
 def _lock(file: int, folder: Path) -> None:

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import gc
 import math
-from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, BinaryIO, NamedTuple, final
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array
+from apo_bench.io import CONTROL, clean, open_file
 from apo_bench.records.record import RECORD_FIELDS
-from apo_bench.records.run.run_folder import each_record
+from apo_bench.records.run.run_folder import TRIALS_KIND, each_record, find_trials
+from apo_bench.records.run.validation import CHECKED, NAMES, decode_kept, find_contradiction
 from apo_bench.records.secret_seed import find_common_secret_seed
-from apo_bench.records.settings import SETTINGS
+from apo_bench.records.settings import RECORD_SCHEMA, SETTINGS
 
 Mask = NDArray[np.bool_]
 """(n,): which trials."""
+Numbers = NDArray[np.floating[Any]]
+"""(n,): a column of numbers, in single precision where that keeps them exactly."""
 Index = NDArray[np.integer[Any]]
 """(n,): indices of trials, or numbers of values or groups."""
 _NOT_KEPT = (
@@ -45,6 +55,16 @@ COLUMNS: Mapping[str, type | None] = {
     "predicted_code": None,
 }
 """Column that is kept -> type of its numbers; None for a column of other values."""
+_PREDICTED = {"predicted_fails": "fails", "predicted_operation": "operation", "predicted_code": "code"}
+"""Column -> key of the failure prediction."""
+_STATED = tuple(name for name in COLUMNS if name not in _PREDICTED)
+_GET = attrgetter(*_STATED)
+_LISTS = tuple(name for name, kind in RECORD_FIELDS.items() if "list" in str(kind))
+"""Columns of lists, which are kept as tuples."""
+_CHUNK = 4_000
+"""Records that are made columns at once."""
+_LEAST_SHARE = 32 * 2**20
+"""Fewest bytes for which a process is worthwhile."""
 
 
 class Coded(NamedTuple):
@@ -68,18 +88,18 @@ class Groups(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """Trial records as columns.
+    """Trial records as columns; a part of them shares the columns, so that it needs little memory."""
 
-    Attributes:
-        numbers: Column -> (n,), with 1 for true, and NaN where a record has no value.
-        coded: Column of texts or tuples -> its values.
-    """
-
-    numbers: Mapping[str, Array]
-    coded: Mapping[str, Coded]
+    columns: Mapping[str, Numbers | Coded]
+    """Column -> its m numbers, with 1 for true, and NaN where a record has no value; or its texts or tuples. A column
+    with the same number everywhere has it once, (1,)."""
+    count: int
+    """Number m of trials in the columns."""
+    index: Index | None = None
+    """(n,): the chosen ones of them; None for all."""
 
     def __len__(self) -> int:
-        return len(self.numbers["seed"])
+        return self.count if self.index is None else len(self.index)
 
     def find_secret_seed(self) -> str | None:
         """Return the hash of the secret seed that all trials were drawn with; None if there is none.
@@ -91,87 +111,245 @@ class Trials:
 
     def number(self, name: str) -> Array:
         """Return a column of numbers, (n,)."""
-        return self.numbers[name]
+        column = self.columns[name]
+        assert isinstance(column, np.ndarray)
+        if len(column) != self.count:
+            return np.full(len(self), column[0], dtype=float)
+        return np.asarray(column if self.index is None else column[self.index], dtype=float)
+
+    def coded(self, name: str) -> Coded:
+        """Return a column of texts or tuples."""
+        column = self.columns[name]
+        assert isinstance(column, Coded)
+        return column if self.index is None else column._replace(codes=column.codes[self.index])
+
+    def is_null(self, name: str) -> Mask:
+        """Return a mask, (n,), of the trials without a value in a column."""
+        if COLUMNS[name] is not None:
+            return np.isnan(self.number(name))
+        codes, names = self.coded(name)
+        return codes == (names.index(None) if None in names else -1)
+
+    def equals(self, other: Trials, name: str) -> Mask:
+        """Return a mask, (n,): whether a column has the same value in two lists of n trials, or in neither."""
+        first, second = _pair_codes(self, other, name)
+        return np.asarray(first == second)
 
     def values(self, name: str) -> list[Any]:
         """Return a column as plain values, with None where a record has no value."""
-        if name in self.coded:
-            codes, names = self.coded[name]
+        if isinstance(self.columns[name], Coded):
+            codes, names = self.coded(name)
             return [names[code] for code in codes.tolist()]
         kind = COLUMNS[name] or float
-        return [None if math.isnan(x) else kind(x) for x in self.numbers[name].tolist()]
+        return [None if math.isnan(x) else kind(x) for x in self.number(name).tolist()]
 
     def distinct(self, name: str) -> list[Any]:
         """Return the distinct values of a column, in the order of their first occurrence."""
-        return list(dict.fromkeys(self.values(name)))
+        return self.where(np.sort(np.unique(self._codes(name), return_index=True)[1])).values(name)
 
     def holds(self, name: str, condition: Callable[[Any], object]) -> Mask:
         """Return a mask, (n,): whether a condition holds for the value of a coded column."""
-        codes, names = self.coded[name]
+        codes, names = self.coded(name)
         # evaluated once per distinct value
         return np.array([bool(condition(each)) for each in names], dtype=bool)[codes]
 
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the trials as records, with the columns that are kept."""
-        columns = [self.values(name) for name in COLUMNS]
-        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+    def rows(self, names: Collection[str] = tuple(COLUMNS)) -> list[dict[str, Any]]:
+        """Return the trials as records, with the columns that are kept, or some of them."""
+        columns = [self.values(name) for name in names]
+        return [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def where(self, which: Mask | Index | slice) -> Trials:
         """Return some of the trials: by a mask, by indices in their order, or by a slice."""
-        return Trials(
-            {name: column[which] for name, column in self.numbers.items()},
-            {name: Coded(column.codes[which], column.names) for name, column in self.coded.items()},
-        )
+        index = np.arange(self.count, dtype=np.int32) if self.index is None else self.index
+        return Trials(self.columns, self.count, index[which])
 
     def groups(self, names: Iterable[str]) -> Groups:
         """Group trials by their values in some columns; the order of the groups has no meaning."""
         names = list(names)
         of = np.zeros(len(self), dtype=np.int64)
         for name in names:
-            own = (
-                self.coded[name].codes if name in self.coded else np.unique(self.numbers[name], return_inverse=True)[1]
-            )
-            # combine both numberings into one, renumbered without gaps
-            of = np.unique(of * (int(own.max(initial=0)) + 1) + own, return_inverse=True)[1]
+            own = self._codes(name)
+            if own.max(initial=0) > 0:  # a column with one value distinguishes nothing
+                # combine both numberings into one, renumbered without gaps
+                of = np.unique(of * (int(own.max()) + 1) + own, return_inverse=True)[1]
         first = self.where(np.unique(of, return_index=True)[1])  # the first trial of each group
         return Groups(list(zip(*(first.values(name) for name in names), strict=True)), of)
 
     def parts(self, names: Iterable[str]) -> dict[tuple[Any, ...], Trials]:
         """Return values in some columns -> the trials with these values, sorted by seed."""
         keys, of = self.groups(names)
-        order = np.lexsort((self.numbers["seed"], of))  # by group, then by seed
+        order = np.lexsort((self.number("seed"), of)).astype(np.int32)  # by group, then by seed
         ends = np.cumsum(np.bincount(of, minlength=len(keys))).tolist()
         together = self.where(order)
         return {key: together.where(slice(a, b)) for key, a, b in zip(keys, [0, *ends], ends, strict=False)}
+
+    def _codes(self, name: str) -> Index:
+        """Return a number for the value of each trial in a column, (n,), from 0."""
+        column = self.columns[name]
+        if isinstance(column, Coded):
+            return self.coded(name).codes
+        if len(column) != self.count:
+            return np.zeros(len(self), dtype=np.int32)
+        return np.unique(self.number(name), return_inverse=True)[1]
+
+
+def pair_groups(first: Trials, second: Trials, names: Iterable[str]) -> tuple[Index, Index]:
+    """Return a number for the values of each trial in some columns, (n,) and (m,); equal values have equal numbers."""
+    of = np.zeros(len(first) + len(second), dtype=np.int64)
+    for name in names:
+        own = np.concatenate(_pair_codes(first, second, name))
+        if np.ptp(own) > 0:
+            own = np.unique(own, return_inverse=True)[1]
+            of = np.unique(of * (int(own.max()) + 1) + own, return_inverse=True)[1]
+    return of[: len(first)], of[len(first) :]
+
+
+def _pair_codes(first: Trials, second: Trials, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return a number for the value of each trial of both in a column, (n,) and (m,); equal values have equal ones."""
+    if COLUMNS[name] is not None:
+        # no number of a record is infinite
+        return np.nan_to_num(first.number(name), nan=np.inf), np.nan_to_num(second.number(name), nan=np.inf)
+    known = _Codes()
+    coded = (first.coded(name), second.coded(name))
+    of, other = (np.array([known[value] for value in each.names], dtype=np.int32)[each.codes] for each in coded)
+    return of, other
+
+
+class _Codes(dict[Any, int]):
+    """Value -> its number; a new value gets the next number."""
+
+    def __missing__(self, value: Any) -> int:
+        self[value] = number = len(self)
+        return number
 
 
 def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
     """Return records as columns; missing settings have their defaults."""
     if isinstance(records, Trials):
         return records
-    numbers: dict[str, array[float]] = {name: array("d") for name, kind in COLUMNS.items() if kind is not None}
-    codes: dict[str, array[int]] = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
-    names: dict[str, dict[Any, int]] = {name: {} for name in codes}
-    for record in records:
-        prediction = record.get("failure_prediction") or {}
-        said = _USUAL | dict(record) | {f"predicted_{key}": x for key, x in prediction.items()}
-        for name, numbered in numbers.items():
-            number = said.get(name)
-            numbered.append(math.nan if number is None else number)
-        for name, coded in codes.items():
-            value = said.get(name)
-            known = names[name]
-            coded.append(known.setdefault(tuple(value) if isinstance(value, list) else value, len(known)))
-    return Trials(
-        {name: np.array(column, dtype=float) for name, column in numbers.items()},
-        {name: Coded(np.array(column, dtype=np.int32), list(names[name])) for name, column in codes.items()},
-    )
+    parts = []
+    for chunk in _batched(records):
+        values = {name: [record.get(name, _USUAL.get(name)) for record in chunk] for name in _STATED}
+        parts.append(_columns_of(values, [record.get("failure_prediction") or {} for record in chunk]))
+    return _join(parts)
 
 
 def read_trials(folder: str | Path) -> Trials:
-    """Read the trials of a sweep.
+    """Read the trials of a sweep; large files are read by several processes where processes can be forked.
 
     Raises:
         InputError: There is no such folder, it holds no trials, or a line is no complete record.
     """
-    return trials_of(each_record(folder))
+    path = find_trials(folder)
+    size = path.stat().st_size
+    many = min(os.cpu_count() or 1, size // _LEAST_SHARE) if sys.platform == "linux" else 1
+    ends = [size * i // max(1, many) for i in range(max(1, many) + 1)]
+    if many <= 1:
+        parts = [_read_share(path, 0, size)]
+    else:
+        with ProcessPoolExecutor(many, multiprocessing.get_context("fork"), gc.disable) as pool:
+            parts = list(pool.map(_read_share, [path] * many, ends, ends[1:]))
+    right = [part for part in parts if part is not None]
+    # the message names the line
+    return _join(right) if len(right) == len(parts) else trials_of(each_record(folder))
+
+
+def _read_share(path: Path, start: int, end: int) -> Trials | None:
+    """Read the records of the lines that begin from `start` to before `end` bytes; None if one is wrong."""
+    parts = []
+    with open_file(path, TRIALS_KIND) as file:
+        for lines in _batched(_lines_between(file, start, end)):
+            records: list[Any]
+            try:
+                records = list(map(decode_kept, lines))
+            except (msgspec.DecodeError, RecursionError, ValueError):
+                return None
+            values = dict(zip(_STATED, zip(*map(_GET, records), strict=True), strict=True))
+            part = _columns_of(values, [record.failure_prediction or {} for record in records])
+            if not _is_consistent(part):
+                return None
+            parts.append(part)
+    return _join(parts)
+
+
+def _is_consistent(trials: Trials) -> bool:
+    """Return whether all records pass the checks of `record_of`, given that they could be decoded."""
+    null = np.column_stack([trials.is_null(name) for name in CHECKED])
+    success, as_demonstrated = trials.number("success"), trials.number("as_demonstrated") == 1.0
+    # few combinations are distinct
+    kinds = null @ (1 << np.arange(len(CHECKED))) * 8 + np.nan_to_num(success, nan=2.0).astype(int) * 2
+    for i in np.unique(kinds + as_demonstrated, return_index=True)[1].tolist():
+        right = None if math.isnan(success[i]) else bool(success[i])
+        if find_contradiction(null[i].tolist(), right, bool(as_demonstrated[i])):
+            return False
+    names = [name for column in NAMES for name in trials.coded(column).names if name]
+    return trials.coded("schema").names == [RECORD_SCHEMA] and not any(map(CONTROL.search, names))
+
+
+def _lines_between(file: BinaryIO, start: int, end: int) -> Iterator[bytes]:
+    """Yield the lines that begin from `start` to before `end` bytes, without an incomplete last line."""
+    position = max(0, start - 1)
+    file.seek(position)
+    position += len(file.readline()) if start else 0  # the line that begins before, or its end
+    for line in file:
+        if position >= end or not line.endswith(b"\n"):
+            return
+        yield line
+        position += len(line)
+
+
+def _batched(items: Iterable[Any]) -> Iterator[list[Any]]:
+    """Yield lists of at most `_CHUNK` items."""
+    left = iter(items)
+    while batch := list(islice(left, _CHUNK)):
+        yield batch
+
+
+def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping[str, Any]]) -> Trials:
+    """Return columns of values, with None where a record has no value, and of failure predictions."""
+    every = {**values, **{name: [each.get(key) for each in predicted] for name, key in _PREDICTED.items()}}
+    columns: dict[str, Numbers | Coded] = {}
+    for name, kind in COLUMNS.items():
+        own = every.get(name, ())
+        if kind is not None:
+            columns[name] = _shorten(np.array(own, dtype=float))
+            continue
+        known = _Codes()
+        plain = [tuple(value) if isinstance(value, list) else value for value in own] if name in _LISTS else own
+        codes = np.fromiter(map(known.__getitem__, plain), np.int32, len(own))
+        names = list(known)
+        columns[name] = Coded(codes, [text and clean(text) for text in names] if name == "sentence" else names)
+    return Trials(columns, len(predicted))
+
+
+def _shorten(column: Array) -> Numbers:
+    """Return numbers, (n,), in less memory: one for equal ones, (1,), and half of it where that keeps them exactly."""
+    if len(column) and _is_equal(column):
+        return column[:1]
+    half = column.astype(np.float32)
+    return half if np.array_equal(half, column, equal_nan=True) else column
+
+
+def _join(parts: Sequence[Trials]) -> Trials:
+    """Return all trials of several parts, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    columns: dict[str, Numbers | Coded] = {}
+    for name, kind in COLUMNS.items():
+        own: list[Any] = [part.columns[name] for part in parts]
+        if kind is None:
+            known = _Codes()
+            numbers = [np.array([known[value] for value in each.names], dtype=np.int32) for each in own]
+            codes = [to[each.codes] for to, each in zip(numbers, own, strict=True)]
+            columns[name] = Coded(np.concatenate([np.zeros(0, dtype=np.int32), *codes]), list(known))
+        elif own and all(len(each) == 1 for each in own) and _is_equal(np.concatenate(own)):
+            columns[name] = own[0]
+        else:
+            whole = [np.broadcast_to(each, part.count) for each, part in zip(own, parts, strict=True)]
+            columns[name] = np.concatenate([np.zeros(0, dtype=np.float32), *whole])
+    return Trials(columns, sum(part.count for part in parts))
+
+
+def _is_equal(column: Numbers) -> bool:
+    """Return whether all numbers, (n,), at least one, are equal, or all are NaN."""
+    return bool(np.isnan(column).all() or (column == column[0]).all())

@@ -1,6 +1,6 @@
 """Decode and check the files of a sweep's folder: records, timings and `run.json`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, cast
 
@@ -42,7 +42,7 @@ TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
     }
 )
 """Key of a line of `timing.jsonl` -> type of its value."""
-_NAMES = (
+NAMES = (
     *("scenario", "noise", "contact_source", "grasp", "arm", "method", "config_hash", "pose_source"),
     *("robot_error", "ft_sensor", "assumed_robot_error"),
 )
@@ -58,6 +58,13 @@ _TOGETHER = (
     ("probe_contacts", "probe_contacts_rejected", "base_error_estimate_mm", "base_error_estimate_deg"),
 )
 """Columns that are all null, or all not null."""
+CHECKED = (
+    *dict.fromkeys(name for names in _TOGETHER for name in names),
+    *("failure_stage", "failure_code", "sim_time_s", "extra_steps"),
+)
+"""Columns that may contradict each other."""
+_LARGE = ("thresholds", "conditions", "tried_corrections", "fit_adjustments", "grasp_slip", "reached")
+"""Columns that tables do not need; without them a record is read in half the time."""
 
 
 def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), **more: Any) -> type[msgspec.Struct]:
@@ -69,6 +76,9 @@ def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), 
 
 
 _RECORD = msgspec.json.Decoder(_struct("TrialRecord", RECORD_FIELDS, REQUIRED))
+_KEPT = {name: kind for name, kind in RECORD_FIELDS.items() if name not in _LARGE}
+decode_kept = msgspec.json.Decoder(_struct("KeptRecord", _KEPT, REQUIRED)).decode
+"""Decodes a line of `trials.jsonl` without its large columns into an object; it raises an error of msgspec."""
 _TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
 _RUN = msgspec.json.Decoder(_struct("Run", RUN_FIELDS))
 # for writing, where unknown columns are an error
@@ -84,13 +94,14 @@ def record_of(line: bytes, where: str) -> TrialRecord:
     Raises:
         InputError: The line is no record.
     """
-    record = _decode(_RECORD, line, where)
+    record = msgspec.structs.asdict(_decode(_RECORD, line, where))
     require(
         record["schema"] == RECORD_SCHEMA,
         f"{where}: a record of schema '{clean(record['schema'])[:60]}' was given; only {RECORD_SCHEMA} can be read.",
     )
-    fault = _contradiction(record)
-    require(not fault, f"{where}, {fault}; remove the line, or the folder.")
+    fault = _find_fault(record)
+    if fault:
+        raise InputError(f"{where}, {fault}; remove the line, or the folder.")
     record["sentence"] = record["sentence"] and clean(record["sentence"])
     return cast(TrialRecord, record)
 
@@ -101,7 +112,7 @@ def timing_of(line: bytes, where: str) -> dict[str, Any]:
     Raises:
         InputError: The line holds no wall times of a trial.
     """
-    return _decode(_TIMING, line, where)
+    return msgspec.structs.asdict(_decode(_TIMING, line, where))
 
 
 def run_of(text: bytes, file: str) -> dict[str, Any]:
@@ -110,7 +121,7 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
     Raises:
         InputError: The text is no such document.
     """
-    run = _decode(_RUN, text, file)
+    run = msgspec.structs.asdict(_decode(_RUN, text, file))
     for name, path in (run["files"] or {}).items():
         require(not CONTROL.search(name + path), f"{file}, field files: control characters are not allowed.")
     return {name: value for name, value in run.items() if value is not None}
@@ -123,31 +134,41 @@ def unwritable(record: Mapping[str, Any]) -> str:
         msgspec.json.encode(record)
     except (msgspec.ValidationError, UnicodeError) as error:
         return str(error)
-    return _contradiction(record)
+    return _find_fault(record)
 
 
-def _decode(decoder: Any, text: bytes, where: str) -> dict[str, Any]:
-    """Decode a text into a dictionary; errors name the place `where`."""
+def _decode(decoder: Any, text: bytes, where: str) -> Any:
+    """Decode a text into an object; errors name the place `where`."""
     try:
-        return msgspec.structs.asdict(decoder.decode(text))
+        return decoder.decode(text)
     except (msgspec.DecodeError, RecursionError, ValueError) as error:
         raise InputError(f"{where}: {clean(str(error))}; remove it, or the folder.") from error
 
 
-def _contradiction(record: Mapping[str, Any]) -> str:
-    """Return a sentence on columns that contradict each other; empty if there are none."""
-    for name in _NAMES:
-        if record.get(name) and CONTROL.search(record[name]):
+def _find_fault(record: Mapping[str, Any]) -> str:
+    """Return a sentence on columns that contradict each other, or hold control characters; empty if there are none."""
+    for name in NAMES:
+        if CONTROL.search(record.get(name) or ""):
             return f"field {name}: control characters are not allowed"
+    null = tuple(record.get(name) is None for name in CHECKED)
+    return find_contradiction(null, record["success"], bool(record.get("as_demonstrated")))
+
+
+def find_contradiction(null: Sequence[bool], success: bool | None, as_demonstrated: bool) -> str:
+    """Return a sentence on columns that contradict each other; empty if there are none.
+
+    Args:
+        null: Whether the value of each column of `CHECKED` is null.
+    """
+    unknown = dict(zip(CHECKED, null, strict=True))
     for names in _TOGETHER:
-        if len({record.get(name) is None for name in names}) > 1:
+        if len({unknown[name] for name in names}) > 1:
             return f"field {names[0]}: {' and '.join(names)} are null together, or none of them is"
-    success = record["success"]
-    failure = record["failure_stage"] is not None and record["failure_code"] is not None
+    failure = not (unknown["failure_stage"] or unknown["failure_code"])
     if (success is False and not failure) or (success and failure):
         return "field failure_stage: a failure has a stage and a code, a success has none"
-    if success and None in (record.get("sim_time_s"), record.get("extra_steps")):
+    if success and (unknown["sim_time_s"] or unknown["extra_steps"]):
         return "field sim_time_s: a success has sim_time_s and extra_steps"
-    if record.get("as_demonstrated") and not success:
+    if as_demonstrated and not success:
         return "field as_demonstrated: it is true, so success must be true as well"
     return ""

@@ -18,7 +18,7 @@ from apo_bench.scenario import compute_human_error_covariance, list_scenario_nam
 from apo_bench.scenario.layout import draw_layouts
 from apo_bench.trial.trial_stages import stream
 
-SHARED = {"bias-view", "correlated", "swaps", "displaced-view"}
+SHARED = {"bias-view", "correlated", "swaps", "displaced-view", "depth-scale", "merged"}
 """What is seen of one part hangs together with what is seen of another."""
 KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurnNoise]
 """Of several independent draws: of each look, of each part, of a camera that fails, of a file, of a class."""

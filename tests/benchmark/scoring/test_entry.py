@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,8 +13,16 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from apo_bench import InputError
-from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, read_entry, score_of, write_entry
-from apo_bench.benchmark.scoring.leaderboard import ranked
+from apo_bench.benchmark.scoring.entry import (
+    SCHEMA,
+    Entry,
+    TrackScore,
+    compare_entries,
+    read_entry,
+    score_of,
+    write_entry,
+)
+from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked
 
 
 def track(overall: bool = True, secret_seed: str | None = None, file: str = "f" * 16, **cells: str) -> TrackScore:
@@ -29,15 +38,16 @@ def track(overall: bool = True, secret_seed: str | None = None, file: str = "f" 
         executed=len(counted),
         predicted_success=None,
         brier=None,
-        rows="0" * 16,
+        reliability=None,
+        records="0" * 16,
         code="1" * 16,
         secret_seed=secret_seed,
-        cells=cells,
+        conditions=cells,
     )
 
 
 def entry(name: str, **tracks: TrackScore) -> Entry:
-    return Entry(SCHEMA, name, name, f"apo-bench score {name}", False, {"mujoco": "3"}, "machine", tracks)
+    return Entry(SCHEMA, name, name, f"apo-bench score {name}", False, {"mujoco": "3"}, "", "machine", tracks)
 
 
 def test_a_score_is_the_mean_over_cells_whatever_trials_count() -> None:
@@ -64,17 +74,18 @@ def test_what_is_written_is_read(cells: dict[str, str]) -> None:
 
 
 def _of(cells: dict[str, str]) -> dict[str, object]:
-    made = track(**{f"c{i}": trials for i, trials in enumerate(cells.values())})
+    named: Any = {f"c{i}": trials for i, trials in enumerate(cells.values())}
+    made = track(**named)
     names = ("score", "low", "high", "trials", "executed")
-    return {**{name: getattr(made, name) for name in names}, "cells": cells}
+    return {**{name: getattr(made, name) for name in names}, "conditions": cells}
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         ({"score": 99.0}, "the score 99 "),
-        ({"executed": 0}, "0 of them executed, are stated, and its cells have 2 with 1 successes"),
-        ({"cells": {"a": "1?"}}, "matching regex"),
+        ({"executed": 0}, "0 of them executed, are stated, and its conditions have 2 with 1 successes"),
+        ({"conditions": {"a": "1?"}}, "matching regex"),
         ({"low": -1.0}, ">= 0.0"),
         ({"rank": 1}, "unknown field"),
     ],
@@ -92,6 +103,36 @@ def test_the_best_stands_first() -> None:
     lines = ranked([entry("low", given=track(a="1000000000")), entry("high", given=track(a="1111111111", b="11"))])
     assert [line.entry.name for line in lines] == ["high", "low"]
     assert [line.place for line in lines] == [1, 2]
+
+
+def test_a_difference_is_over_the_trials_of_both_and_agrees_with_the_scores() -> None:
+    ours, theirs = (
+        entry(name, given=track(a=a, b=b)) for name, a, b in (("m", "110x", "1111"), ("contact", "1000", "1x11"))
+    )
+    (found,) = compare_entries(ours, theirs).values()
+    assert found.value == pytest.approx(100 * (1 / 3 + 0) / 2)
+    line, reference = ranked([ours, theirs])
+    assert line.difference is not None
+    assert line.difference.interval == pytest.approx(found.interval)
+    assert line.p == pytest.approx(found.p)
+    assert reference.difference is None
+    other = entry("m", given=track(file="e" * 16, a="1"))
+    assert compare_entries(other, theirs) == {}
+
+
+def test_p_values_are_adjusted_for_all_comparisons_with_the_reference() -> None:
+    reference = entry("contact", given=track(a="0" * 20 + "1" * 20))
+    better = [entry(f"m{i}", given=track(a="0" * 12 + "1" * 28)) for i in range(3)]
+    (raw,) = compare_entries(better[0], reference).values()
+    lines = ranked([reference, *better])
+    assert [line.p for line in lines if line.p is not None] == pytest.approx([3 * raw.p] * 3)
+
+
+def test_an_entry_without_all_tracks_has_no_score_and_stands_last() -> None:
+    whole = entry("whole", given=track(a="10"), tight=track(a="10"))
+    lines = ranked([entry("part", given=track(a="11")), whole])
+    assert [(line.entry.name, line.score is None) for line in lines] == [("whole", False), ("part", True)]
+    assert len(leaderboard_table(lines).items) == 1
 
 
 def test_verified_is_who_was_run_with_a_salt_of_the_organiser_in_every_track() -> None:

@@ -39,7 +39,7 @@ def filled(folder: Path, cells: list[str]) -> Path:
 
 def test_the_form_makes_an_entry_that_the_judge_would_make(tmp_path: Path) -> None:
     entry = read_real_entry(filled(tmp_path, list(LETTERS)), "contact", name="our lab")
-    assert list(entry.tracks["real-stick_in_tower"].cells.values()) == ["".join(LETTERS.values())]
+    assert list(entry.tracks["real-stick_in_tower"].conditions.values()) == ["".join(LETTERS.values())]
     assert entry.tracks["real-stick_in_tower"].trials == len(LETTERS) - 1
     assert entry.overall is None
     write_entry(entry, tmp_path / "entry.json")

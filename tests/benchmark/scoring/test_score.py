@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from apo_bench import InputError
 from apo_bench.benchmark.scoring.entry import read_entry
-from apo_bench.benchmark.scoring.track import read_track, read_tracks, track_names
-from apo_bench.benchmark.sweeps.grid import AXES, check_grids
+from apo_bench.benchmark.scoring.track import read_track, read_tracks
+from apo_bench.benchmark.sweeps.grid import check_grids, list_conditions
 from apo_bench.cli.app import main
+from apo_bench.records.run.run_folder import read_records
 
 SMALL = """
 scenario = ["block_on_block"]
@@ -25,8 +26,6 @@ grasp = ["weld"]
 schema = "apo-bench/track/1"
 title = "A small one"
 """
-MOST = 240
-FEWER = {"long": 80, "round": 80, "generated": 80}
 AS_OBSERVED = """
 import json, sys
 request = json.loads(sys.stdin.readline())
@@ -45,21 +44,21 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def scored(small: Path, name: str, *entrant: str) -> dict[str, str]:
     command = ["score", *entrant, "--track", "small.toml", "--out", f"{name}.json", "--workers", "1"]
     assert main(command) == 0
-    return dict(read_entry(small / f"{name}.json").tracks["small"].cells)
+    return dict(read_entry(small / f"{name}.json").tracks["small"].conditions)
 
 
-@pytest.mark.parametrize("name", track_names())
-def test_every_track_is_no_larger_than_was_promised(name: str) -> None:
-    track = read_track(name)
-    for method in ("contact-robust", "contact+probe"):
-        grids = [grid for arm in track.arms for grid in track.of(method, arm)]
-        for grid in grids:
-            check_grids([grid])
-        sizes = [[max(1, len(getattr(grid, axis.name))) for axis in AXES] for grid in grids]
-        trials = sum(grid.trials * math.prod(size) for grid, size in zip(grids, sizes, strict=True))
-        assert 0 < trials <= FEWER.get(name, MOST)
-        quick = [grid for arm in track.arms for grid in track.of(method, arm, quick=True)]
-        assert all(grid.trials == track.quick_trials for grid in quick)
+def test_the_tracks_of_the_score_are_few_and_large_enough() -> None:
+    tracks = read_tracks([])
+    assert 0 < len(tracks) <= 8
+    assert len({grid.seed for track in tracks for grid in track.grids}) == len(tracks)
+    for track in tracks:
+        (arm,) = track.arms
+        grids = track.of("contact", arm)
+        check_grids(grids)
+        conditions = list_conditions(grids)
+        assert len(conditions) * grids[0].trials >= (120 if track.name == "generated" else 470)
+        assert grids[0].trials >= 10
+        assert {grid.trials for grid in track.of("contact", arm, quick=True)} == {track.quick_trials}
 
 
 def test_a_program_scores_as_the_same_corrector_in_python(small: Path) -> None:
@@ -75,6 +74,25 @@ def test_an_entry_that_is_there_is_continued_and_made_the_same(small: Path) -> N
     scored(small, "once", "contact")
     assert (small / "once" / "small" / "six_axis" / "trials.jsonl").read_bytes() == rows
     assert (small / "once.json").read_bytes() == first
+
+
+def test_the_seeds_of_a_track_are_drawn_for_each_condition_and_are_those_of_the_records(small: Path) -> None:
+    (small / "small.toml").write_text(SMALL.replace("[1]", "[1, 2]"))
+    letters = scored(small, "once", "nominal")
+    track = read_track("small.toml")
+    trials = track.find_trials("six_axis")
+    assert sorted(trials.values()) == [(f"block_on_block, noise_level {n}", k) for n in (1, 2) for k in (0, 1)]
+    records = read_records(small / "once" / "small" / "six_axis")
+    assert {record["seed"] for record in records} == set(trials)
+    for record in records:
+        condition, number = trials[record["seed"]]
+        assert f"noise_level {record['noise_mm']:g}" in condition
+        assert letters[condition][number] == str(int(bool(record["success"])))
+    seed = next(iter(trials))
+    expected = np.random.SeedSequence(0, spawn_key=(0, 0)).generate_state(1, np.uint64)[0] >> np.uint64(11)
+    assert seed == expected
+    again = ["run", "block_on_block", "--noise-level", "1", "--human-error-scale", "0", "--grasp", "weld"]
+    assert main([*again, "--method", "nominal", "--seed", str(seed)]) in (0, 1)
 
 
 def test_a_score_never_deletes_another_track(small: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,7 +128,8 @@ def test_what_is_wrong_is_said_in_one_sentence(
         ("trials = 2", "trials = 2\nmethod = 'contact'", "a track has no method"),
         ("track/1", "track/2", "schema"),
         ('title = "A small one"', 'title = "x"\nquick_trials = 0', "a whole number >= 1 is needed"),
-        ("[track]", "[[also]]\nseed = 5\n\n[track]", "begin with the same seed"),
+        ("[track]", "[[also]]\nseed = 5\n\n[track]", "have the same seed"),
+        ("[track]", "[[also]]\ntrials = 5\n\n[track]", "have the same trials"),
     ],
 )
 def test_a_track_that_is_wrong_is_refused(small: Path, old: str, new: str, said: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.benchmark.analysis import (
     ALL,
+    CONDITION_FIELDS,
     Condition,
     Line,
     Rate,
@@ -18,12 +19,12 @@ from apo_bench.benchmark.analysis import (
     tally,
 )
 from apo_bench.benchmark.report.trial_text import NUMBERS, verdict, why
-from apo_bench.errors import require
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.records import KEY, SETTINGS, Key, describe_secret_seed, get_record_key
+from apo_bench.records import KEY, SETTINGS, describe_secret_seed, get_record_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
-from apo_bench.records.run.trials import Mask, Trials, read_trials
+from apo_bench.records.run.trials import Index, Mask, Trials, pair_groups, read_trials
 
 _ENDING = ("success", "failure_stage", "failure_code")  # columns that must agree for the same ending
 _RESULT = (  # columns that must agree for identical trials
@@ -90,18 +91,22 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         f"'{first}' was drawn {drawn[0]} and '{second}' {drawn[1]}, so that they have no trial in common; compare "
         "sweeps of one secret seed.",
     )
-    ours = _number_by_key(a)
-    theirs = _number_by_key(b)
-    both = [key for key in ours if key in theirs]
-    require(both, f"'{first}' and '{second}' have no trial in common; compare sweeps of the same settings and seeds.")
-    x = a.trials.where(np.array([ours[key] for key in both]))  # the shared trials of both, in the same order
-    y = b.trials.where(np.array([theirs[key] for key in both]))
+    ours, theirs = pair_groups(a.trials, b.trials, KEY)
+    for side, keys in ((a, ours), (b, theirs)):
+        _check_once(side, keys)
+    # without observations from files
+    first_at, second_at = (np.flatnonzero(~np.isnan(side.trials.number("noise_mm"))) for side in (a, b))
+    _, i, j = np.intersect1d(ours[first_at], theirs[second_at], assume_unique=True, return_indices=True)
+    order = np.argsort(i)  # as in the first sweep
+    require(len(i), f"'{first}' and '{second}' have no trial in common; compare sweeps of the same settings and seeds.")
+    x = a.trials.where(first_at[i[order]])  # the shared trials of both, in the same order
+    y = b.trials.where(second_at[j[order]])
     return Comparison(
         first=a,
         second=b,
         differences=_differences(a, b),
-        shared=len(both),
-        alone=(len(ours) - len(both), len(theirs) - len(both)),
+        shared=len(x),
+        alone=(len(first_at) - len(x), len(second_at) - len(x)),
         agreements=_agreements(x, y),
         changed=_changed(a._replace(trials=x), b._replace(trials=y)),
         numbers=_number_changes(x, y),
@@ -130,28 +135,24 @@ def _settings_of(side: Side) -> dict[str, Any]:
     return plain | settings | {f"records: {name}": sorted(side.trials.distinct(name)) for name in shared}
 
 
-def _number_by_key(side: Side) -> dict[Key, int]:
-    """Return key -> index of each trial, without observations from files.
-
-    Raises:
-        InputError: A trial occurs twice.
-    """
-    index: dict[Key, int] = {}
-    for i, key in enumerate(zip(*(side.trials.values(name) for name in KEY), strict=True)):
-        require(
-            key not in index,
-            f"'{side.folder}' holds a trial twice ({', '.join(map(str, key))}); every trial counts once, so leave one "
-            "of the two out.",
+def _check_once(side: Side, keys: Index) -> None:
+    """Raise an `InputError` if a trial occurs twice."""
+    _, first = np.unique(keys, return_index=True)
+    if len(first) < len(keys):
+        twice = np.setdiff1d(np.arange(len(keys)), first)[:1]
+        (record,) = side.trials.where(twice).rows(KEY)
+        raise InputError(
+            f"'{side.folder}' holds a trial twice ({', '.join(map(str, record.values()))}); every trial counts once, "
+            "so leave one of the two out."
         )
-        index[key] = i
-    drawn = ~np.isnan(side.trials.number("noise_mm"))
-    return {key: i for key, i in index.items() if drawn[i]}
 
 
 def _same(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
     """Return a mask, (n,), of the trials whose values agree exactly in all these columns."""
-    ours, theirs = (zip(*(trials.values(name) for name in names), strict=True) for trials in (a, b))
-    return np.array([x == y for x, y in zip(ours, theirs, strict=True)], dtype=bool)
+    same = np.ones(len(a), dtype=bool)
+    for name in names:
+        same &= a.equals(b, name)
+    return same
 
 
 def _agreements(a: Trials, b: Trials) -> list[Line]:
@@ -254,11 +255,11 @@ def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Lin
     """
     ours, theirs = ({_at_any_fidelity(c.condition): c for c in tally(trials)} for trials in (first, second))
     # condition -> indices of its shared trials
-    of: dict[Condition, list[int]] = {condition: [] for condition in sorted({**ours, **theirs}, key=make_sort_key)}
-    for i, record in enumerate(a.rows()):
-        condition = get_condition(record)
-        assert condition is not None
-        of[_at_any_fidelity(condition)].append(i)
+    groups = a.groups(name for name in CONDITION_FIELDS if name != "fidelity")
+    fields = [dict(zip((n for n in CONDITION_FIELDS if n != "fidelity"), key, strict=True)) for key in groups.keys]
+    shared = {Condition(**own): np.flatnonzero(groups.of == k) for k, own in enumerate(fields)}
+    none = np.zeros(0, dtype=int)
+    of = {condition: shared.get(condition, none) for condition in sorted({**ours, **theirs}, key=make_sort_key)}
     x = a.number("success")
     y = b.number("success")
     return [

@@ -6,6 +6,7 @@ A cell is a button that opens its trials.
 import base64
 import gzip
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ from apo_bench.benchmark.analysis import (
     list_levels,
 )
 from apo_bench.benchmark.report.trial_text import NUMBERS, predicted, verdict, why
+from apo_bench.geometry import Array
 from apo_bench.io import group_by
 from apo_bench.records import Limits, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
@@ -28,6 +30,22 @@ from apo_bench.records.run.trials import Trials
 
 _DECIMALS = {"extra_steps": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
 """Decimals of numbers; others have three."""
+_WORDS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "verdict": verdict,
+    "why": why,
+    "sentence": lambda row: row["sentence"] or "",
+    "failure_prediction": predicted,
+}
+"""Text of a trial -> function of its record."""
+_NEEDED = (
+    *("success", "as_demonstrated", "loose_success", "failure_stage", "failure_code", "failure_operation", "sentence"),
+    *("predicted_fails", "predicted_operation", "predicted_code"),
+)
+"""Columns that these functions need."""
+_MOST_LISTED = 100_000
+"""Trials that a page lists, shared out over its cells; `trials.jsonl` has all."""
+_FEWEST_LISTED = 100
+"""Trials of a cell that a page always lists."""
 
 
 class Button(NamedTuple):
@@ -70,31 +88,32 @@ def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mappin
 
 
 def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[str, int]) -> str:
-    """Pack the trials of all cells for the script of the page: JSON, compressed by gzip, as base64.
+    """Pack the trials of all cells, or the first of each, for the script of the page: JSON, by gzip, as base64.
 
     Args:
         pictures: `cell:seed` -> number of the picture of that trial.
     """
     cells = group_by_condition(trials).values()
-    words: dict[str, Callable[[Mapping[str, Any]], str]] = {
-        "verdict": verdict,
-        "why": why,
-        "sentence": lambda row: row["sentence"] or "",
-        "failure_prediction": predicted,
-        "command": lambda row: without_seed(row, files, limits),
-    }
-    columns: dict[str, list[Any]] = {name: [] for name in ("seed", *words, *NUMBERS)}
+    most = max(_FEWEST_LISTED, _MOST_LISTED // max(1, len(cells)))
+    columns: dict[str, list[Any]] = {name: [] for name in ("seed", *_WORDS, "command", *NUMBERS)}
     # texts repeat often, so each is kept once, and columns hold its number
-    known: dict[str, dict[str, int]] = {name: {} for name in words}
-    for own in cells:
+    known: dict[str, dict[str, int]] = {name: {} for name in (*_WORDS, "command")}
+    shown = [own.where(slice(most)) for own in cells]
+    for own in shown:
         columns["seed"] += own.values("seed")
         for name in NUMBERS:
-            columns[name] += [_rounded(x, _DECIMALS.get(name, 3)) for x in own.values(name)]
-        for row in own.rows():
-            for name, say in words.items():
-                columns[name].append(known[name].setdefault(say(row), len(known[name])))
+            columns[name] += _rounded(own.number(name), _DECIMALS.get(name, 3))
+        # trials of a condition differ in nothing but the seed, and the limit that a lost trial exceeded
+        first = own.where(slice(1)).rows()[0]
+        commands = {lost: without_seed(first | {"failure_stage": lost}, files, limits) for lost in (None, "worker")}
+        for row in own.rows(_NEEDED):
+            said = {name: say(row) for name, say in _WORDS.items()}
+            said["command"] = commands["worker" if row["failure_stage"] == "worker" else None]
+            for name, text in said.items():
+                columns[name].append(known[name].setdefault(text, len(known[name])))
     values = {
-        "ends": np.cumsum([len(own) for own in cells]).tolist(),  # the end of each cell's trials in the columns
+        "ends": np.cumsum([len(own) for own in shown]).tolist(),  # the end of each cell's trials in the columns
+        "counts": [len(own) for own in cells],
         "words": {name: list(texts) for name, texts in known.items()},
         "numbers": [[name, label, _DECIMALS.get(name, 3)] for name, label in NUMBERS.items()],
         "columns": columns,
@@ -104,9 +123,6 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=6, mtime=0)).decode()
 
 
-def _rounded(x: Any, decimals: int) -> float | int | None:
-    """Round a number as it is shown; the script adds trailing zeros."""
-    if x is None or isinstance(x, int):
-        return x
-    near = round(float(x), decimals)
-    return int(near) if near == int(near) else near
+def _rounded(numbers: Array, decimals: int) -> list[float | int | None]:
+    """Round numbers, (n,), as they are shown, with None for NaN; the script adds trailing zeros."""
+    return [None if math.isnan(x) else int(x) if x == int(x) else x for x in np.round(numbers, decimals).tolist()]

@@ -105,6 +105,8 @@
     const only = made("input", null, { type: "checkbox" });
     const label = made("label");
     label.append(only, ` failures only (${failures.length} of ${all.length})`);
+    const count = found.counts[cell];
+    if (all.length < count) label.append(`; the first ${all.length} of ${count} trials, trials.jsonl has all`);
     const close = made("button", "close", { type: "button" });
     close.addEventListener("click", () => shut(button, panel));
     tools.append(label, close);

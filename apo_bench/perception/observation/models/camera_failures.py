@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Observation, compute_placements, make_measured_model
 from apo_bench.errors import require
 from apo_bench.geometry import Array, find_approximate_symmetries, pose
-from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.camera import CAMERA_DISTANCE_M, Camera
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
@@ -28,6 +28,12 @@ VIEW_SHIFT_M = 0.02
 """Standard deviation of the displacement of a view along each axis."""
 VIEW_TURN_RAD = float(np.radians(5.0))
 """Standard deviation of the displacement of a view about each axis."""
+LAG_M = (0.003, 0.03)
+"""Smallest and largest distance by which a moving part is observed too early on its way."""
+DEPTH_SCALE = 0.01
+"""Standard deviation of the error of a depth over the depth, at the distance of the middle of the workspace."""
+CAD_SCALE = 0.03
+"""Largest error of the size of a part's model; half of it is the smallest."""
 _MOST_REPEAT = 0.999
 """Largest probability of a repeated failure that an observation states."""
 
@@ -193,6 +199,55 @@ def _displace_view(poses: Array, shown: Demonstration, camera: Camera, rate: flo
         poses[view] = P @ pose.exp(error) @ pose.inverse(P) @ poses[view]
 
 
+def _lag(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Shift parts back along the straight way from where they were before the operation."""
+    before = (shown.start, *compute_placements(shown.assembly, shown.start, shown.poses))
+    for k in draw_failed_operations(len(poses), rate, rng):
+        way = before[k][shown.assembly.operations[k].main][:3, 3] - poses[k, :3, 3]
+        lag = rng.uniform(*LAG_M)
+        poses[k, :3, 3] += way * min(1.0, lag / max(float(np.linalg.norm(way)), lag))
+
+
+def _scale_depth(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Shift all parts along their rays by one error of the scale of depth, which grows with the distance."""
+    distance = np.linalg.norm(poses[:, :3, 3] - camera.T_world_camera[:3, 3], axis=1)
+    shift = rng.standard_normal() * DEPTH_SCALE * distance**2 / CAMERA_DISTANCE_M * (rate > 0.0)
+    poses[:, :3, 3] += camera.rays(poses) * shift[:, None]
+
+
+def _merge(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Shift a part to the middle between it and the nearest part that was placed before."""
+    for k in draw_failed_operations(len(poses), rate, rng):
+        own = shown.assembly.operations[k].main
+        placed = [i for i in range(k) if shown.assembly.operations[i].main != own]
+        if placed:
+            apart = shown.poses[placed, :3, 3] - shown.poses[k, :3, 3]
+            poses[k, :3, 3] += 0.5 * apart[np.argmin(np.linalg.norm(apart, axis=1))]
+
+
+def _misjudge_size(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Shift parts along their rays in the ratio of the size of a wrong model, the same in all operations of a part."""
+    mains = [operation.main for operation in shown.assembly.operations]
+    parts = list(dict.fromkeys(mains))
+    rays = camera.rays(poses)
+    distance = np.linalg.norm(poses[:, :3, 3] - camera.T_world_camera[:3, 3], axis=1)
+    for i in draw_failed_operations(len(parts), rate, rng):
+        scale = rng.choice((-1.0, 1.0)) * rng.uniform(0.5 * CAD_SCALE, CAD_SCALE)
+        own = np.array([main == parts[i] for main in mains])
+        poses[own, :3, 3] += scale * distance[own, None] * rays[own]
+
+
+def _mirror(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Turn parts about the vertical, so that their angle to the view of the camera has the wrong sign."""
+    view = camera.T_world_camera[:3, 2]
+    for k in draw_failed_operations(len(poses), rate, rng):
+        x = poses[k, :3, 0]
+        yaw = np.arctan2(x[1], x[0]) - np.arctan2(view[1], view[0])
+        # an angle from -45 to 45 degrees to the nearest axis of the view
+        nearest = yaw - 0.5 * np.pi * np.round(yaw / (0.5 * np.pi))
+        poses[k, :3, :3] = pose.exp(np.array([0, 0, 0, 0, 0, -2.0 * nearest]))[:3, :3] @ poses[k, :3, :3]
+
+
 PRESETS: Mapping[str, Failure] = MappingProxyType(
     {
         "flips": Failure(
@@ -227,6 +282,35 @@ PRESETS: Mapping[str, Failure] = MappingProxyType(
                 "A share p of the operations, at least two",
             ),
             by_part=False,
+        ),
+        "latency": Failure(
+            _lag,
+            "moving parts are observed too early",
+            f"S = T shifted back by {1e3 * LAG_M[0]:g} to {1e3 * LAG_M[1]:g} mm on the straight way of the part",
+        ),
+        "depth-scale": Failure(
+            _scale_depth,
+            "depths have an error of scale that grows with the distance",
+            f"S = T shifted by s d^2 / {CAMERA_DISTANCE_M:g} m along the ray, d its length, one s of all operations",
+            (f"s: {DEPTH_SCALE:g}", "All operations fail, whatever p is"),
+            by_part=False,
+        ),
+        "merged": Failure(
+            _merge,
+            "two parts are detected as one",
+            "S = T shifted to the middle between the part and the nearest one that was placed before",
+            by_part=False,
+        ),
+        "cad-scale": Failure(
+            _misjudge_size,
+            "the model of a part has the wrong size",
+            f"S = T shifted by s d along the ray, d its length, s of {0.5 * CAD_SCALE:g} to {CAD_SCALE:g} or negative",
+            ("One s of a part in all operations", "p: share of parts whose model is wrong"),
+        ),
+        "mirrored-yaw": Failure(
+            _mirror,
+            "parts are observed with a mirrored turn about the vertical",
+            "S = T turned about the vertical, so that the angle to the nearest axis of the view has the wrong sign",
         ),
     }
 )
