@@ -15,12 +15,12 @@ from typing import Any, final
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation
 from apo_bench.benchmark.scoring.track import read_track
-from apo_bench.benchmark.sweeps.grid import SweepConfig, load_all, units
+from apo_bench.benchmark.sweeps.grid import SweepConfig, list_work_units, load_all
 from apo_bench.errors import require
 from apo_bench.io import format_count
 from apo_bench.records import CORRECTOR, TrialConfig
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fingerprint import content_hash
+from apo_bench.trial.fingerprint import compute_content_hash
 from apo_bench.trial.keywords import configure_trial
 from apo_bench.trial.run import record_trial
 from apo_bench.trial.trial_stages import demonstration_of, scene_key, scene_of
@@ -130,7 +130,7 @@ def _conditions(trials: Any, method: str) -> list[TrialConfig]:
         return [replace(trials, method=method)]
     track = read_track(trials)
     grids: list[SweepConfig] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
-    return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit]
+    return [trial for grid in grids for unit in list_work_units([grid], load_all([grid])) for trial in unit]
 
 
 def _outcomes(configs: list[TrialConfig], seed: int, corrector: Any, failures: list[str]) -> Iterator[bool]:
@@ -141,7 +141,7 @@ def _outcomes(configs: list[TrialConfig], seed: int, corrector: Any, failures: l
         key = scene_key(config)
         if key not in scenes:
             scene = scene_of(config)
-            scenes[key] = scene, content_hash(scene.scenario, config.scenario, scene.arm.files)
+            scenes[key] = scene, compute_content_hash(scene.scenario, config.scenario, scene.arm.files)
         scene, content = scenes[key]
         record = record_trial(config, scene, demonstration_of(config, scene), content, method=corrector)
         if record["success"] is not None:

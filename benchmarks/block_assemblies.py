@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed_parts import on_the_table, read_posed
+from apo_bench.importers.assembly.posed_parts import place_on_table, read_posed
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts.making import Body, extrude, join, make_polygon, make_rectangle
 from benchmarks.generated import Assembled, Between, Place, write
@@ -155,6 +155,6 @@ def scenario_of_blocks(seed: int, folder: Path) -> Path:
     """Write the scenario file of the assembly of a seed."""
     poses = write(blocks(seed), folder)
     path = folder / f"blocks_{seed}.toml"
-    made = new_scenario(on_the_table(read_posed(poses)))
+    made = new_scenario(place_on_table(read_posed(poses)))
     write_scenario(made, path, f"Blocks {seed}", poses.name)
     return path

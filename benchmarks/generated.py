@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed_parts import on_the_table, read_posed
+from apo_bench.importers.assembly.posed_parts import place_on_table, read_posed
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts.making import (
     Body,
@@ -236,6 +236,6 @@ def scenario_of(seed: int, folder: Path) -> Path:
     """Write the scenario file of the assembly of a seed."""
     poses = write(generated(seed), folder)
     path = folder / f"generated_{seed}.toml"
-    made = new_scenario(on_the_table(read_posed(poses)))
+    made = new_scenario(place_on_table(read_posed(poses)))
     write_scenario(made, path, f"Generated assembly {seed}", poses.name)
     return path

@@ -23,8 +23,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import read_timing, tally
-from apo_bench.benchmark.analysis.paired import paired
-from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.analysis.paired import compare_pairs
+from apo_bench.benchmark.report.report import write_report
 from apo_bench.records.run.run_folder import read_records
 from benchmarks.headline_figure import draw_summary
 from benchmarks.headline_page import describe_fidelity, page
@@ -80,7 +80,7 @@ def keep(folder: Path) -> None:
     """Keep trials, table and what ran."""
     rows = read_records(folder)
     KEPT.mkdir(parents=True, exist_ok=True)
-    shutil.copy(report(folder).tables["conditions"], KEPT / "table.csv")
+    shutil.copy(write_report(folder).tables["conditions"], KEPT / "table.csv")
     (KEPT / "run.json").write_text(json.dumps(describe_run(folder, rows), indent=2) + "\n", encoding="utf-8")
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
     packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
@@ -99,7 +99,7 @@ def write(fidelity: Sequence[str]) -> None:
     summary = summarise(tally(rows))
     ran = json.loads((KEPT / "run.json").read_text(encoding="utf-8"))
     draw_summary(summary, FIGURE)
-    lines = page(summary, paired(rows, ("paper",)), ran, fidelity)
+    lines = page(summary, compare_pairs(rows, ("paper",)), ran, fidelity)
     PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
     for path, (pictures, link) in BLOCKS.items():
         before, rest = path.read_text(encoding="utf-8").split(BEGIN)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.grid import list_work_units, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 
 
@@ -37,7 +37,7 @@ def trials_of(*sweeps: Path) -> set[Any]:
     trials = set[Any]()
     for path in sweeps:
         grids = read_sweep(path)
-        for unit in units(grids, load_all(grids)):
+        for unit in list_work_units(grids, load_all(grids)):
             trials.update(unit)
     return trials
 

@@ -3,9 +3,10 @@
     python -m benchmarks.train_dagger_insert draw FOLDER   # a round of episodes under the network of now
     python -m benchmarks.train_dagger_insert train FOLDER  # on all rounds, writes FOLDER/weights.npz; needs PyTorch
 
-Rounds of `draw` and `train` take turns; the network of the first round is all zeros, which is the approach alone. The
-teacher is `expert` of `apo_bench.envs.policies`, which knows the true poses; in each episode it takes over at a drawn
-step. A round of 24 episodes takes two minutes of one core. The package has such weights in assets/learned/insert.npz.
+Rounds of `draw` and `train` take turns; the network of the first round is all zeros, which is the approach
+alone. The teacher is `expert` of `apo_bench.envs.policies`, which knows the true poses; in each episode it takes over
+at a drawn step. A round of 24 episodes takes two minutes of one core. The package has such weights in
+assets/learned/insert.npz.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from apo_bench.perception.observation.observe import observe
 from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.planning.prediction.first_failure import predict_failure
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.pose_error import measure_goal_errors
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "wrong_contacts.csv"
@@ -63,7 +63,7 @@ Counts = Mapping[tuple[str, str, str], int]
 def is_right(scenario: Scenario, shown: Demonstration, poses: Array) -> bool:
     """Return whether a plan with these target poses, (n, 4, 4), is right."""
     assembly = shown.assembly
-    if goal_errors(assembly, shown.start, shown.poses, poses)[0] > CLEARANCE_MM:
+    if measure_goal_errors(assembly, shown.start, shown.poses, poses)[0] > CLEARANCE_MM:
         return False
     for operation, placed in zip(assembly.operations, compute_placements(assembly, shown.start, poses), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))

@@ -16,7 +16,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.report.report import write_report
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.browser import PORT, Page
@@ -52,7 +52,7 @@ def shoot_report(chromium: Any, folder: Path) -> None:
     """Write the report of a small sweep, and take its top."""
     shutil.copytree(SWEEP, folder)
     page = chromium.new_page(viewport={"width": 1180, "height": 880})
-    page.goto(report(folder).page.resolve().as_uri())
+    page.goto(write_report(folder).page.resolve().as_uri())
     shoot(page, "report.png")
 
 

@@ -16,7 +16,7 @@ from apo_bench.viz.noise_sheet import (
     draw_errors,
     find_facts,
     list_models,
-    nominal_demonstration,
+    make_nominal_demonstration,
 )
 
 PAGE = Path(__file__).parent / "reference" / "noise-models.md"
@@ -67,7 +67,7 @@ def row(name: str) -> str:
     sample = draw_errors(name, NOISE_LEVEL)
     found = np.sqrt(np.mean(sample.errors**2, axis=0))
     errors = " | ".join(f"{a:.3g} / {b:.3g}" for a, b in zip(found, sample.stated, strict=True))
-    shown = nominal_demonstration()
+    shown = make_nominal_demonstration()
     noise = make_noise(name, NOISE_LEVEL)
     complete = 0
     fails = 0

@@ -15,7 +15,7 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.rollout import Rollout
 from apo_bench.trial.trial_stages import observe_demonstration, simulate_demonstration
-from apo_bench.viz.poses_picture import draw_poses, poses_panel
+from apo_bench.viz.poses_picture import draw_poses, make_poses_panel
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 7
@@ -28,8 +28,8 @@ def main() -> None:
     observed = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
     corrected = correct(observed, "contact").poses
     panels = [
-        poses_panel("observed", observed, observed.poses, 3),
-        poses_panel("corrected by contacts", observed, corrected, 3),
+        make_poses_panel("observed", observed, observed.poses, 3),
+        make_poses_panel("corrected by contacts", observed, corrected, 3),
     ]
     draw_poses(scene.scenario, 3, panels, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):

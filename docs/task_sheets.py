@@ -12,7 +12,7 @@ from apo_bench.assembly import build_relation_graph
 from apo_bench.scenario import Scenario
 from apo_bench.scenario.scenario_file import list_scenario_names, load_scenario
 from apo_bench.viz.graph_picture import draw_graph
-from apo_bench.viz.task_sheet import task_sheet
+from apo_bench.viz.task_sheet import write_task_sheet
 from benchmarks.baselines import difficulty, read_counts
 
 PAGE = Path(__file__).parent / "reference" / "scenarios.md"
@@ -53,7 +53,7 @@ def page(scenarios: Sequence[Scenario]) -> str:
     """Return the page of all task sheets."""
     lines = [HEAD.format(table=difficulty(scenarios, read_counts()))]
     for s in scenarios:
-        head, _, rest = task_sheet(s, 2).partition("\n\n")
+        head, _, rest = write_task_sheet(s, 2).partition("\n\n")
         graph = f"![Relations of {s.name} after its last operation]({PICTURE.format(s.name)})"
         lines += [f'<a id="{s.name}"></a>', "", head, "", graph, "", rest]
     return "\n".join(lines)

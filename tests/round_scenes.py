@@ -12,7 +12,7 @@ from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.records import Thresholds
-from apo_bench.scenario.attach_lines import with_attach_lines
+from apo_bench.scenario.attach_lines import add_attach_lines
 from apo_bench.scenario.parts import find_part_path, load_part
 from apo_bench.scenario.parts.making import Body, bore, extrude, make_rectangle, make_shaft, write_part
 from apo_bench.scenario.scenario import Grasp, Site
@@ -73,7 +73,7 @@ def scenario(
         clearance_mm=0.25,
         gap_mm=0.1,
     )
-    return with_attach_lines(made, (Preference(),) * len(goals), "round")
+    return add_attach_lines(made, (Preference(),) * len(goals), "round")
 
 
 def peg_in_hole(folder: Path, off: tuple[float, float] = (0.0, 0.0)) -> Scenario:

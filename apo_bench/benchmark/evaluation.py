@@ -7,7 +7,7 @@ from typing import Any
 
 from apo_bench.benchmark.rate_table import RateTable
 from apo_bench.benchmark.session import name_functions
-from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, as_tuple
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, convert_to_tuple
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.errors import require, require_known, shown
 from apo_bench.names import SESSION
@@ -72,10 +72,10 @@ def evaluate(
         isinstance(seeds, int) and not isinstance(seeds, bool) and seeds >= 1,
         f"seeds must be a whole number of at least 1, got {shown(seeds)}.",
     )
-    labelled = dict(_label(method, "method"))
-    noises = dict(_label(settings.pop("noise", ()), "noise"))
+    labelled = dict(_label_values(method, "method"))
+    noises = dict(_label_values(settings.pop("noise", ()), "noise"))
     functions = {label: each for label, each in (labelled | noises).items() if callable(each)}
-    settings["scenario"] = tuple(map(_scenario_source, as_tuple(settings.get("scenario", ()))))
+    settings["scenario"] = tuple(map(_scenario_source, convert_to_tuple(settings.get("scenario", ()))))
     with name_functions(functions) as names:
         local = [label for label, name in names.items() if name.startswith(f"{SESSION}:")]
         require(
@@ -96,7 +96,7 @@ def evaluate(
         folder = Path(temporary.name if temporary else save or "")
         records = run_sweep(grid, folder, workers=None if workers == 1 else workers)
     labels = {called[label]: label for label in called}
-    return RateTable(tuple(_relabel(record, labels) for record in records), folder, tuple(labelled), temporary)
+    return RateTable(tuple(_relabel_record(record, labels) for record in records), folder, tuple(labelled), temporary)
 
 
 def _scenario_source(scenario: str | Path | Scenario) -> str:
@@ -111,7 +111,7 @@ def _scenario_source(scenario: str | Path | Scenario) -> str:
     return scenario.name if shipped else str(scenario.source)
 
 
-def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
+def _label_values(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
     """Return pairs of label and value of methods or noise models; `kind` is `method` or `noise`."""
     if isinstance(given, Mapping):
         for label, each in given.items():
@@ -135,7 +135,7 @@ def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
     return named
 
 
-def _relabel(record: TrialRecord, labels: Mapping[str, str]) -> TrialRecord:
+def _relabel_record(record: TrialRecord, labels: Mapping[str, str]) -> TrialRecord:
     """Return a record with the labels that the caller gave."""
     method, noise = record["method"], record["noise"]
     return {**record, "method": labels.get(method, method), "noise": labels.get(noise, noise)}

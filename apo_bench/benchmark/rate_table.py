@@ -43,7 +43,7 @@ class RateTable:
         """The table as text with aligned columns, and the error of each method that raised one."""
         table = self._table()
         words = [column.words for column in table.shown]
-        lines = _align([[column.head for column in table.shown], *table.lines], words)
+        lines = _align_cells([[column.head for column in table.shown], *table.lines], words)
         return "\n".join((*lines, *self._describe_errors()))
 
     def to_pandas(self) -> Any:
@@ -77,12 +77,12 @@ class RateTable:
             InputError: Another ending, or the file cannot be written.
         """
         from apo_bench.benchmark.analysis import list_settings, tally
-        from apo_bench.benchmark.report.figures.figures import figures
+        from apo_bench.benchmark.report.figures.figures import draw_figures
 
         target = Path(path)
         require(target.suffix in (".svg", ".png"), f"'{path}' was given; use a file name that ends in .svg or .png.")
         cells = tally(self.records)
-        drawn = figures(cells, (), list_settings(cells), (), (), (), ())
+        drawn = draw_figures(cells, (), list_settings(cells), (), (), (), ())
         return drawn["success_over_noise_level"].write(target)
 
     def save(self, folder: str | Path) -> Path:
@@ -110,14 +110,14 @@ class RateTable:
     def _table(self) -> Any:
         """Return the table of conditions that a report has, too, with methods in the order of the caller."""
         from apo_bench.benchmark.analysis import make_settings_key, tally
-        from apo_bench.benchmark.report.tables.conditions import condition_table
+        from apo_bench.benchmark.report.tables.conditions import make_condition_table
 
         ranks = {method: rank for rank, method in enumerate(self.methods)}
         by_method = sorted(tally(self.records), key=lambda cell: ranks.get(cell.method, len(ranks)))
-        return condition_table(sorted(by_method, key=make_settings_key))
+        return make_condition_table(sorted(by_method, key=make_settings_key))
 
 
-def _align(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:
+def _align_cells(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:
     """Yield lines of cells as aligned text: columns with `words` to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     for line in lines:

@@ -59,35 +59,35 @@ for _group in (arm, assembly, dataset, inspection, method, noise, part, recordin
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `module:name` may name a module in the current folder."""
     try:
-        here = streams.prepare()
+        here = streams.prepare_streams()
         words = list(sys.argv[1:] if arguments is None else arguments)
         with own_modules_in(here):
             code = app(args=words or ["--help"], prog_name="apo-bench", standalone_mode=False)
-        streams.finish()
+        streams.flush_and_finish()
     except InputError as error:
-        return _complain(str(error), WRONG_REQUEST)
+        return _print_error(str(error), WRONG_REQUEST)
     except (Interruption, KeyboardInterrupt) as error:
-        return _complain(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
+        return _print_error(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
     except (RuntimeError, streams.Unusable) as error:
-        return _complain(str(error), NO_RESULT)
+        return _print_error(str(error), NO_RESULT)
     except MemoryError:
-        return _complain("there is not enough memory.", NO_RESULT)
+        return _print_error("there is not enough memory.", NO_RESULT)
     except OSError as error:
-        return _complain(streams.unexpected(error), NO_RESULT)
+        return _print_error(streams.describe_unexpected_error(error), NO_RESULT)
     except SystemExit as error:
         # the command line library leaves like this when the reader of a pipe is gone
         if not isinstance(error.__context__, OSError):
             raise
-        streams.give_up_output()
+        streams.discard_output()
         return 0
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise
-        return _complain(" ".join(error.format_message().split()), WRONG_REQUEST)
+        return _print_error(" ".join(error.format_message().split()), WRONG_REQUEST)
     return int(code or 0)
 
 
-def _complain(sentence: str, code: int) -> int:
+def _print_error(sentence: str, code: int) -> int:
     with suppress(OSError):
         typer.echo(f"apo-bench: {shorten_text(clean(sentence))}", err=True)
     return code

@@ -52,7 +52,7 @@ def arm_check(
     from apo_bench.simulation.arms.finding import find_arm
     from apo_bench.viz.arm_picture import draw_arm
     from apo_bench.viz.arm_text import arm_check_form
-    from apo_bench.viz.form_text import fact_lines
+    from apo_bench.viz.form_text import list_facts
 
     check_output(out, "--out", ".png")
     task = load_scenario(scenario)
@@ -60,5 +60,5 @@ def arm_check(
     checked = check_arm(arm, task, layouts)
     if out is not None:
         draw_arm(arm, task, out)
-    print_columns(fact_lines(arm_check_form(checked)))
+    print_columns(list_facts(arm_check_form(checked)))
     print_written(out)

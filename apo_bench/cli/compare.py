@@ -25,9 +25,9 @@ def compare_command(
     """
     from apo_bench.benchmark.report.comparison.compare import compare
     from apo_bench.benchmark.report.comparison.text import (
-        comparison_form,
-        comparison_tables,
-        in_words,
+        describe_comparison,
+        make_comparison_form,
+        make_comparison_tables,
         write_comparison,
     )
     from apo_bench.cli.rates import print_report_table
@@ -36,10 +36,10 @@ def compare_command(
     folder = Path("comparison") if out is None and not as_json else out
     page = None if folder is None else write_comparison(comparison, folder)
     if as_json:
-        print_json(comparison_form(comparison))
+        print_json(make_comparison_form(comparison))
         return
-    typer.echo(clean(in_words(comparison)))
-    print_report_table(comparison_tables(comparison)["agreement"])
+    typer.echo(clean(describe_comparison(comparison)))
+    print_report_table(make_comparison_tables(comparison)["agreement"])
     names = [line["what"] for line in comparison.differences]
     more = f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
     typer.echo(clean(f"Not the same: {', '.join(names[:_MOST_NAMES]) or 'nothing'}{more}"))

@@ -18,7 +18,7 @@ from apo_bench.cli.shared import (
     print_columns,
     print_json,
     print_table,
-    say,
+    print_text,
 )
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, resolve_simulated
@@ -45,11 +45,11 @@ def correct_command(
       apo-bench correct stick_in_tower --observation docs/seen.csv --method contact-drop --out plan.json
     """
     from apo_bench import correct
-    from apo_bench.formats.deviations import assumed_deviations
+    from apo_bench.formats.deviations import note_assumed_deviations
     from apo_bench.formats.observation import read_observation_file
-    from apo_bench.viz.correct_text import POSE_COLUMNS, SUSPECT_COLUMNS, correction_form, correction_lines
-    from apo_bench.viz.dof_text import DOF_COLUMNS, dof_rows
-    from apo_bench.viz.form_text import form_table
+    from apo_bench.viz.correct_text import POSE_COLUMNS, SUSPECT_COLUMNS, format_correction, make_correction_form
+    from apo_bench.viz.dof_text import DOF_COLUMNS, list_dof_rows
+    from apo_bench.viz.form_text import make_table
 
     check_output(out, "--out", ".json", ".csv", inputs=(observation,))
     observed, task, assumed = read_observation_file(
@@ -64,8 +64,8 @@ def correct_command(
     with redirect_output(as_json):
         correction = correct(observed, resolve_simulated(method))
     explanation = _explain_solution(observed, correction)
-    form = correction_form(task.name, method, observed, correction, explanation, assumed)
-    lines = correction_lines(form, correction)
+    form = make_correction_form(task.name, method, observed, correction, explanation, assumed)
+    lines = format_correction(form, correction)
     moved, predicted_success = "", None
     if correction.ok:
         plan, moved, predicted_success = plan_correction(task, observed, correction)
@@ -73,19 +73,19 @@ def correct_command(
         if out is not None:
             _write_plan(out, scenario, task.name, plan)
     if assumed:
-        lines.append(("noise", assumed_deviations(deviation_mm, deviation_deg)))
+        lines.append(("noise", note_assumed_deviations(deviation_mm, deviation_deg)))
     if as_json:
         print_json(form | {"moved": moved or None, "predicted_success": predicted_success})
     else:
         print_columns([("observation", str(observation)), *lines])
-        free = explanation and dof_rows(explanation)
+        free = explanation and list_dof_rows(explanation)
         suspects = form["test"] and form["test"]["suspects"]
         tables = ((form["operations"], POSE_COLUMNS), (free, DOF_COLUMNS), (suspects, SUSPECT_COLUMNS))
         for rows, columns in tables:
             if rows:
-                print_table(form_table(rows, columns))
+                print_table(make_table(rows, columns))
     if out is not None and correction.ok:
-        say(f"Wrote {out}{moved and f': {moved}'}", as_json)
+        print_text(f"Wrote {out}{moved and f': {moved}'}", as_json)
     if not correction.ok:
         raise typer.Exit(NO_RESULT)
 
@@ -103,11 +103,11 @@ def _explain_solution(observation: Observation, correction: Correction) -> Any:
 
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
-    from apo_bench.formats.csv_form import table
+    from apo_bench.formats.csv_form import write_csv_table
     from apo_bench.formats.json_forms import write_form
-    from apo_bench.formats.plan_json import plan_form
+    from apo_bench.formats.plan_json import make_plan_form
 
     if out.suffix.lower() == ".json":
-        write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
+        write_form(make_plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
     else:
-        write_file(out, table(plan.assembly, plan.target_poses))
+        write_file(out, write_csv_table(plan.assembly, plan.target_poses))

@@ -39,21 +39,23 @@ def detect_contacts_command(
       apo-bench detect-contacts stick_in_tower --noise-level 2 --seed 3
       apo-bench detect-contacts stick_in_tower --observation docs/seen.csv --contact-source detected-jointly
     """
-    from apo_bench.formats.deviations import assumed_deviations
-    from apo_bench.trial.detected_contacts import detect_by
+    from apo_bench.formats.deviations import note_assumed_deviations
+    from apo_bench.trial.detected_contacts import detect_with_source
     from apo_bench.trial.request import load_or_draw_observation
-    from apo_bench.viz.detection_text import CONTACT_COLUMNS, detection_form
-    from apo_bench.viz.form_text import fact_lines, form_table
+    from apo_bench.viz.detection_text import CONTACT_COLUMNS, make_detection_form
+    from apo_bench.viz.form_text import list_facts, make_table
 
     require_known("contact source", contact_source, DETECTED)
     with redirect_output(as_json):
         observed, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
-    form = detection_form(scenario, contact_source, observed, detect_by(observed, contact_source), assumed)
+    form = make_detection_form(
+        scenario, contact_source, observed, detect_with_source(observed, contact_source), assumed
+    )
     if as_json:
         print_json(form)
         return
-    print_table(form_table(form["contacts"], CONTACT_COLUMNS), 140)
+    print_table(make_table(form["contacts"], CONTACT_COLUMNS), 140)
     typer.echo()
-    print_columns(fact_lines(form, ("schema", "contacts")))
+    print_columns(list_facts(form, ("schema", "contacts")))
     if assumed:
-        typer.echo(assumed_deviations(deviation_mm, deviation_deg))
+        typer.echo(note_assumed_deviations(deviation_mm, deviation_deg))

@@ -11,7 +11,7 @@ from apo_bench.cli.shared import NO_RESULT, print_columns
 from apo_bench.errors import InputError
 from apo_bench.io import group_by
 
-_FOR_DEVELOPERS = ("dev", "docs", "notebook")
+_DEVELOPER_EXTRAS = ("dev", "docs", "notebook")
 """Extras that no command needs."""
 
 
@@ -48,7 +48,9 @@ def _read_extras() -> dict[str, list[str]]:
         extra = re.search(r"extra == ['\"](\w+)", requirement)
         name = re.match(r"[\w.-]+", requirement)
         pairs.append((extra.group(1) if extra else "", name.group() if name else requirement))
-    return {extra: [*dict.fromkeys(names)] for extra, names in group_by(pairs).items() if extra not in _FOR_DEVELOPERS}
+    return {
+        extra: [*dict.fromkeys(names)] for extra, names in group_by(pairs).items() if extra not in _DEVELOPER_EXTRAS
+    }
 
 
 def _find_version(package: str) -> str:

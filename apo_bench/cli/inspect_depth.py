@@ -33,18 +33,18 @@ def depth_command(
       apo-bench inspect depth stick_in_tower --seed 7 --noise-mm 2 --out depth.png
     """
     from apo_bench.viz.depth_picture import draw_depth
-    from apo_bench.viz.depth_run import DEPTH_COLUMNS, depth_form, run_depth_camera
-    from apo_bench.viz.form_text import form_table
+    from apo_bench.viz.depth_run import DEPTH_COLUMNS, make_depth_form, run_depth_camera
+    from apo_bench.viz.form_text import make_table
 
     check_output(out, "--out", ".png")
     run = run_depth_camera(scenario, noise_mm, seed, human_error_scale)
-    form = depth_form(run, noise_mm, seed, human_error_scale)
+    form = make_depth_form(run, noise_mm, seed, human_error_scale)
     if out is not None:
         draw_depth(run, out, view - 1)
     if as_json:
         print_json(form)
     else:
-        print_table(form_table(form["operations"], DEPTH_COLUMNS), 140)
+        print_table(make_table(form["operations"], DEPTH_COLUMNS), 140)
     print_written(out, as_json=as_json)
     if not all(operation["found"] for operation in form["operations"]):
         raise typer.Exit(NO_RESULT)

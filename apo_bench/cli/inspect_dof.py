@@ -36,19 +36,19 @@ def dof_command(
       apo-bench inspect dof stick_in_tower --observation docs/seen.csv
     """
     from apo_bench import correct, explain, load_scenario
-    from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, assumed_deviations
-    from apo_bench.formats.observation import as_planned, read_observation_file
+    from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, note_assumed_deviations
+    from apo_bench.formats.observation import make_nominal_observation, read_observation_file
     from apo_bench.viz.dof_text import (
         DOF_COLUMNS,
         PART_COLUMNS,
         count_directions,
-        dof_form,
-        dof_rows,
-        hypothesis_forms,
-        hypothesis_lines,
-        shared_lines,
+        format_hypotheses,
+        format_shared_errors,
+        list_dof_rows,
+        make_dof_form,
+        make_hypothesis_forms,
     )
-    from apo_bench.viz.form_text import form_table
+    from apo_bench.viz.form_text import make_table
 
     check_output(out, "--out", ".png")
     predicted_success = None
@@ -56,7 +56,7 @@ def dof_command(
         task, assumed = load_scenario(scenario), True
         mm = DEVIATION_MM if deviation_mm is None else deviation_mm
         deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
-        observed = as_planned(task, mm, deg)
+        observed = make_nominal_observation(task, mm, deg)
         explanation = explain(observed, observed.poses)
     else:
         observed, task, assumed = read_observation_file(
@@ -71,20 +71,20 @@ def dof_command(
         from apo_bench.viz.dof_picture import draw_dof
 
         draw_dof(task, observed, explanation, out)
-    form = dof_form(task.name, explanation)
+    form = make_dof_form(task.name, explanation)
     if as_json:
-        more = {"predicted_success": predicted_success, "hypotheses": hypothesis_forms(explanation.hypotheses)}
+        more = {"predicted_success": predicted_success, "hypotheses": make_hypothesis_forms(explanation.hypotheses)}
         print_json(form | more)
         return
     lines = [
         f"{task.name}: {count_directions(explanation)}",
         f"at the {'nominal poses' if observation is None else f'corrected poses of {observation}'}",
-        *([assumed_deviations(deviation_mm, deviation_deg)] if assumed else []),
+        *([note_assumed_deviations(deviation_mm, deviation_deg)] if assumed else []),
         *([] if predicted_success is None else [f"predicted success {predicted_success:.2f}"]),
-        *(f"hypothesis {line}" for line in hypothesis_lines(explanation.hypotheses)),
-        *shared_lines(explanation),
+        *(f"hypothesis {line}" for line in format_hypotheses(explanation.hypotheses)),
+        *format_shared_errors(explanation),
     ]
     typer.echo("\n".join(lines))
-    print_table(form_table(dof_rows(explanation), DOF_COLUMNS))
-    print_table(form_table(form["parts"], PART_COLUMNS))
+    print_table(make_table(list_dof_rows(explanation), DOF_COLUMNS))
+    print_table(make_table(form["parts"], PART_COLUMNS))
     print_written(out)

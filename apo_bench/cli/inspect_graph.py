@@ -11,8 +11,8 @@ from apo_bench.cli.shared import (
     check_output,
     make_path_option,
     print_json,
+    print_text,
     print_written,
-    say,
 )
 
 
@@ -35,7 +35,7 @@ def graph_command(
     from apo_bench.assembly import build_relation_graph, compute_observed_residuals
     from apo_bench.io import write_file
     from apo_bench.viz.graph_picture import draw_graph
-    from apo_bench.viz.graph_text import graph_form, graph_lines, mermaid_text
+    from apo_bench.viz.graph_text import format_graph, format_mermaid, make_graph_form
 
     check_output(out, "--out", ".svg", ".png", ".mmd")
     task = load_scenario(scenario)
@@ -45,10 +45,10 @@ def graph_command(
     gap_m = task.gap_mm * 1e-3 if observed is None else observed.gap_m
     title = f"{task.name} after operation {graph.step}"
     if out is not None and out.suffix.lower() == ".mmd":
-        write_file(out, mermaid_text(graph))
+        write_file(out, format_mermaid(graph))
     elif out is not None:
         draw_graph(graph, out, title, residuals=residuals, gap_m=gap_m, colors=task.colors)
     if as_json:
-        print_json(graph_form(task.name, graph, residuals))
-    say("\n".join([title, "", *graph_lines(graph, residuals, gap_m)]), as_json)
+        print_json(make_graph_form(task.name, graph, residuals))
+    print_text("\n".join([title, "", *format_graph(graph, residuals, gap_m)]), as_json)
     print_written(out, as_json=as_json)

@@ -18,7 +18,7 @@ from apo_bench.cli.shared import (
     print_written,
 )
 from apo_bench.errors import require
-from apo_bench.formats.deviations import assumed_deviations
+from apo_bench.formats.deviations import note_assumed_deviations
 from apo_bench.formats.observation import ObservationFile, read_observation_file
 from apo_bench.formats.robot_frames import RobotFrames, read_robot_frames
 from apo_bench.geometry import pose
@@ -56,8 +56,8 @@ def plan_command(
     """
     from apo_bench import load_scenario
     from apo_bench.formats.json_forms import write_form
-    from apo_bench.viz.plan_text import describe_plan, plan_lines, plan_text
-    from apo_bench.viz.robot_form import robot_form
+    from apo_bench.viz.plan_text import describe_plan, format_plan, list_plan_lines
+    from apo_bench.viz.robot_form import make_robot_form
 
     check_output(robot, "--robot", ".json")
     belongs = {"--method": method, "--deviation-mm": deviation_mm, "--deviation-deg": deviation_deg, "--robot": robot}
@@ -74,35 +74,35 @@ def plan_command(
         read = read_observation_file(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
         task = read.scenario
         if read.assumed and method not in WITHOUT_CORRECTOR:
-            notes.append(assumed_deviations(deviation_mm, deviation_deg))
+            notes.append(note_assumed_deviations(deviation_mm, deviation_deg))
         with redirect_output(as_json):
             plan, predicted_success = _plan_observation(read, method, notes)
         where = f"at the poses of {observation}, {method}; directions in the frame of the assembly, poses in the world"
     robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if arm is not None:
         from apo_bench.simulation.arms.finding import find_arm
-        from apo_bench.trial.plan_warnings import arm_sentence
+        from apo_bench.trial.plan_warnings import describe_arm_limits
 
-        notes.append(arm_sentence(task, None if observation is None else plan, arm))
+        notes.append(describe_arm_limits(task, None if observation is None else plan, arm))
         if frames is None:
             found = find_arm(arm)
             robot_frames = RobotFrames(pose.unpack(np.array([*found.base, *found.turn])))
-    lines = plan_lines(plan, task)
+    lines = list_plan_lines(plan, task)
     if robot is not None:
-        form = robot_form(lines, plan, task, robot_frames, notes)
+        form = make_robot_form(lines, plan, task, robot_frames, notes)
         if ft_sensor is not None:
             from apo_bench import build_scene
-            from apo_bench.viz.probing_form import probing_form
+            from apo_bench.viz.probing_form import make_probing_form
 
             scene = build_scene(task, arm=arm or SETTINGS["arm"].default)
-            form["probing"] = probing_form(plan, scene, robot_frames, ft_sensor)
+            form["probing"] = make_probing_form(plan, scene, robot_frames, ft_sensor)
         write_form(form, robot)
     if as_json:
         print_json(describe_plan(lines, task, notes) | {"predicted_success": predicted_success})
         return
     if predicted_success is not None:
         notes.insert(0, f"predicted success: {predicted_success:.2f}")
-    typer.echo("\n".join([f"{task.name} {where}: mm and degrees", "", *plan_text(lines), "", *notes]).rstrip())
+    typer.echo("\n".join([f"{task.name} {where}: mm and degrees", "", *format_plan(lines), "", *notes]).rstrip())
     print_written(robot)
 
 
@@ -114,7 +114,7 @@ def _require_with(option: str, value: object, others: dict[str, Any]) -> None:
 
 def _plan_observation(read: ObservationFile, method: str, notes: list[str]) -> tuple[Plan, float]:
     """The plan that a method makes from an observation, and its predicted success; adds notes."""
-    from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.trial.plan_warnings import describe_plan_warnings
     from apo_bench.trial.planning import apply_method
     from apo_bench.trial.predicted_success import predict_success
 
@@ -124,5 +124,5 @@ def _plan_observation(read: ObservationFile, method: str, notes: list[str]) -> t
         why = result.failure.sentence if result.failure is not None else "the method made no plan"
         raise RuntimeError(f"the observation gives no plan: {why.rstrip('.')}.")
     moved = "" if result.fitting is None else result.fitting.sentence
-    notes += filter(None, (moved, plan_warning(read.scenario, result.plan, result.correction)))
+    notes += filter(None, (moved, describe_plan_warnings(read.scenario, result.plan, result.correction)))
     return result.plan, predict_success(result.plan, read.observation, result.correction, read.scenario)

@@ -42,10 +42,10 @@ def poses_command(
       apo-bench inspect poses stick_in_tower --observation docs/seen.csv --operation 2 --observed
     """
     from apo_bench import correct, fit_plan, load_scenario
-    from apo_bench.formats.deviations import assumed_deviations
-    from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.formats.deviations import note_assumed_deviations
+    from apo_bench.trial.plan_warnings import describe_plan_warnings
     from apo_bench.trial.request import load_or_draw_observation
-    from apo_bench.viz.poses_picture import draw_poses, poses_lines, poses_panel
+    from apo_bench.viz.poses_picture import draw_poses, format_poses, make_poses_panel
 
     check_output(out, "--out", ".png")
     task = load_scenario(scenario)
@@ -54,18 +54,18 @@ def poses_command(
     require(1 <= step <= last, f"--operation must be from 1 to {last}, got {step}.")
     seen, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
     _check_observed(seen, step)
-    panels = [poses_panel("observed", seen, seen.poses, step)]
+    panels = [make_poses_panel("observed", seen, seen.poses, step)]
     if not observed:
         correction = correct(seen, resolve_simulated(method))
         if not correction.ok:
             raise RuntimeError(f"{method} found no correction: {correction.sentence}; --observed needs none")
         plan = fit_plan(correction, seen, task)
-        notes = "; ".join(filter(None, (plan.sentence, plan_warning(task, plan.plan, correction))))
-        panels.append(poses_panel(f"corrected by {method}", seen, plan.plan.target_poses, step, notes))
+        notes = "; ".join(filter(None, (plan.sentence, describe_plan_warnings(task, plan.plan, correction))))
+        panels.append(make_poses_panel(f"corrected by {method}", seen, plan.plan.target_poses, step, notes))
     draw_poses(task, step, panels, out)
-    typer.echo("\n".join(poses_lines(panels)))
+    typer.echo("\n".join(format_poses(panels)))
     if assumed and not observed:
-        typer.echo(assumed_deviations(deviation_mm, deviation_deg))
+        typer.echo(note_assumed_deviations(deviation_mm, deviation_deg))
     print_written(out)
 
 

@@ -13,8 +13,8 @@ from apo_bench.cli.shared import (
     make_path_option,
     print_columns,
     print_json,
+    print_text,
     print_written,
-    say,
 )
 from apo_bench.io import write_file
 from apo_bench.records import check
@@ -62,11 +62,11 @@ def noise_show(
       apo-bench noise show megapose-lmo --noise-level 0.5
     """
     from apo_bench.perception.observation.noise import NoiseLevel
-    from apo_bench.viz.noise_sheet import draw_errors, noise_sheet
+    from apo_bench.viz.noise_sheet import draw_errors, write_noise_sheet
 
     check("noise_mm", noise_level, called="noise_level")
     level = NoiseLevel(noise_level, noise_level)
-    typer.echo(noise_sheet(name, level, draw_errors(name, level)), nl=False)
+    typer.echo(write_noise_sheet(name, level, draw_errors(name, level)), nl=False)
 
 
 @commands.command("fit", cls=Command)
@@ -99,7 +99,7 @@ def noise_fit(
     from apo_bench.perception.observation.models.residuals import match_residuals
     from apo_bench.perception.observation.noise_file import format_noise_file
     from apo_bench.viz.fit_picture import draw_fit
-    from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
+    from apo_bench.viz.fit_text import format_fit, list_fit_notes, make_fit_form
 
     inputs = (estimates, truth) if models is None else (estimates, truth, models)
     check_output(out, "--out", ".toml", inputs=inputs)
@@ -109,21 +109,21 @@ def noise_fit(
     known = models or find_models_info(truth)
     symmetries = None if known is None else read_symmetries(known)
     matched = match_residuals(results, read_truth(truth, results, scene_id), symmetries)
-    fitted = fit_noise(matched, _one_line(source or f"{estimates.name} against {truth.name}"))
-    form = fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
+    fitted = fit_noise(matched, _clean_line(source or f"{estimates.name} against {truth.name}"))
+    form = make_fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:
         command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-        write_file(out, format_noise_file(fitted, (_one_line(command), *fit_notes(form))))
+        write_file(out, format_noise_file(fitted, (_clean_line(command), *list_fit_notes(form))))
     if residuals is not None:
         write_file(residuals, format_residuals(matched))
     if picture is not None:
         draw_fit(matched, fitted, picture)
     if as_json:
         print_json(form)
-    say("\n".join(fit_lines(form)), as_json)
+    print_text("\n".join(format_fit(form)), as_json)
     print_written(out, residuals, picture, as_json=as_json)
 
 
-def _one_line(text: str) -> str:
+def _clean_line(text: str) -> str:
     """A text that may hold a file name, without line ends and control characters."""
     return "".join(c if c.isprintable() else " " for c in text)

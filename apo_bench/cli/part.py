@@ -15,7 +15,7 @@ from apo_bench.cli.shared import (
     make_path_option,
     name_write_errors,
     print_json,
-    say,
+    print_text,
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
@@ -57,25 +57,25 @@ def part_import(
       apo-bench part import bracket.step --out parts
       apo-bench part import bracket.stl --unit mm --name hole1=bore --out parts
     """
-    from apo_bench.importers.cad.part_import import raw_solids
-    from apo_bench.importers.cad.part_report import file_lines, report_file
-    from apo_bench.importers.cad.pose_file import named_places, write_places
+    from apo_bench.importers.cad.part_import import read_raw_solids
+    from apo_bench.importers.cad.part_report import format_file_report, report_file
+    from apo_bench.importers.cad.pose_file import name_places, write_places
     from apo_bench.importers.cad.solids.naming import rename_faces
 
     names = _parse_names(name or [])
-    source, solids = raw_solids(file, unit, round_sides)
+    source, solids = read_raw_solids(file, unit, round_sides)
     require(
         not names or len(solids) <= 1,
         f"--name renames the faces of one solid, and {file} holds {len(solids)}; import each from its own file.",
     )
     with name_write_errors(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
-        say("\n".join(file_lines(source, file)), as_json)
+        print_text("\n".join(format_file_report(source, file)), as_json)
         imported, refused = _import_solids(file, [rename_faces(raw, names) for raw in solids], out, density, as_json)
-        places = named_places({part.path.stem: part.raw.places for part in imported})
+        places = name_places({part.path.stem: part.raw.places for part in imported})
         poses = write_places(places, out, file.name) if len(places) > 1 else None
     if poses is not None:
-        say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
+        print_text(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
         print_json(report_file(source, file, imported, poses))
     refused = [*source.left_out, *refused]
@@ -120,7 +120,7 @@ def _import_solids(
     """Parts with their pictures, and the reasons why other solids became none."""
     from apo_bench.importers.cad.part_import import import_solid
     from apo_bench.importers.cad.part_picture import draw_part
-    from apo_bench.importers.cad.part_report import part_lines, report_part
+    from apo_bench.importers.cad.part_report import format_part_report, report_part
     from apo_bench.importers.cad.solids.naming import clean_title, make_part_name
 
     imported: list[Any] = []
@@ -139,7 +139,7 @@ def _import_solids(
         imported.append(part)
         picture = out / f"{stem}.png"
         draw_part(part.raw, part.refused, stem, picture)
-        say("\n".join([*part_lines(report_part(part)), f"Wrote {part.path} and {picture}"]), as_json)
+        print_text("\n".join([*format_part_report(report_part(part)), f"Wrote {part.path} and {picture}"]), as_json)
     return imported, refused
 
 

@@ -6,7 +6,7 @@ import typer
 from rich.table import Table as TerminalTable
 
 from apo_bench.benchmark.analysis import ConditionResult
-from apo_bench.benchmark.report.tables.conditions import condition_table
+from apo_bench.benchmark.report.tables.conditions import make_condition_table
 from apo_bench.benchmark.report.tables.table import Table
 from apo_bench.cli.shared import print_table
 from apo_bench.io import clean
@@ -24,6 +24,6 @@ def print_report_table(table: Table) -> None:
 
 def print_rates(cells: Sequence[ConditionResult]) -> None:
     """Print success rates with their intervals, and how many trials do not count."""
-    print_report_table(condition_table(cells))
+    print_report_table(make_condition_table(cells))
     if excluded := sum(cell.excluded for cell in cells):
         typer.echo(f"Trials that do not count, because the demonstration itself failed: {excluded:,}.")

@@ -87,7 +87,7 @@ def _import_for_scenario(
 ) -> Any:
     """Write the observation, and return lines on what was done and doubts."""
     from apo_bench.formats.json_forms import write_form
-    from apo_bench.formats.observation_json import observation_form
+    from apo_bench.formats.observation_json import make_observation_form
     from apo_bench.importers.recording.drawing import draw_recording
     from apo_bench.importers.recording.importing import import_recording
     from apo_bench.importers.recording.text import PATH_HEAD, describe_recording, path_rows
@@ -109,7 +109,7 @@ def _import_for_scenario(
     found = imported.arrangement.camera
     if out.suffix.lower() == ".json":
         name = scenario if scenario == task.name else str(Path(scenario).resolve())
-        write_form(observation_form(imported.observation, name), out)
+        write_form(make_observation_form(imported.observation, name), out)
     else:
         _write_table(out, mains, rests, imported.observation.poses, imported.covariance)
     if paths is not None:

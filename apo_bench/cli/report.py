@@ -19,16 +19,16 @@ def report_command(
       apo-bench report runs/mine
       apo-bench report runs/mine --max-pictures 0
     """
-    from apo_bench.benchmark.report.report import report
-    from apo_bench.benchmark.report.tables.methods import prediction_summary
+    from apo_bench.benchmark.report.report import write_report
+    from apo_bench.benchmark.report.tables.methods import summarise_predictions
     from apo_bench.cli.rates import print_rates
-    from apo_bench.viz.failure_pictures import failure_pictures
+    from apo_bench.viz.failure_pictures import draw_failures
 
-    made = report(folder, max_pictures, failure_pictures)
+    made = write_report(folder, max_pictures, draw_failures)
     print_rates(made.conditions)
     endings = ".csv and .parquet" if has_parquet() else ".csv (.parquet needs the package pyarrow)"
     lines = [
-        prediction_summary(made.confusions[-1]),
+        summarise_predictions(made.confusions[-1]),
         *([f"Failures that were not drawn: {'; '.join(made.no_pictures)}."] if made.no_pictures else []),
         f"Answer:  {made.answer.replace('`', '')}",
         f"Tables:  {made.tables['conditions']} and {len(made.tables) - 1} more, as {endings}",

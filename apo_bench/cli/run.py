@@ -52,8 +52,8 @@ def run_command(
     from apo_bench.trial.rollout import Rollout
     from apo_bench.viz.choose_viewer import choose_display
     from apo_bench.viz.choose_viewer import view as step_through
-    from apo_bench.viz.form_text import fact_lines
-    from apo_bench.viz.trial_text import summary_lines
+    from apo_bench.viz.form_text import list_facts
+    from apo_bench.viz.trial_text import format_summary
 
     check_output(video, "--video", ".mp4", ".gif")
     check_output(save_observation, "--save-observation", ".json")
@@ -72,8 +72,8 @@ def run_command(
     if as_json:
         print_json(record)
     else:
-        more = fact_lines(record) if verbose else []
-        print_columns([*summary_lines(record, scenario, observation), *more])
+        more = list_facts(record) if verbose else []
+        print_columns([*format_summary(record, scenario, observation), *more])
     replayed = record["sim_time_s"] is not None
     if not replayed and (video or view):
         typer.echo("apo-bench: the robot did not replay anything, so there is nothing to see.", err=True)

@@ -71,9 +71,9 @@ def scenario_show(scenario: ScenarioArgument) -> None:
       apo-bench scenario show generated:bridges:17
     """
     from apo_bench import load_scenario
-    from apo_bench.viz.task_sheet import task_sheet
+    from apo_bench.viz.task_sheet import write_task_sheet
 
-    typer.echo(task_sheet(load_scenario(scenario)), nl=False)
+    typer.echo(write_task_sheet(load_scenario(scenario)), nl=False)
 
 
 @commands.command("new", cls=Command)
@@ -117,7 +117,7 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
-    from apo_bench.importers.assembly.scenario_writer import choice_lines
+    from apo_bench.importers.assembly.scenario_writer import list_choices
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     names = [name.strip() for name in order.split(",")] if order else []
@@ -132,7 +132,7 @@ def write_new_scenario(
         clearance_mm=clearance_mm,
         max_overlap_mm=max_overlap_mm,
     )
-    typer.echo("\n".join(choice_lines(made)))
+    typer.echo("\n".join(list_choices(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; next: apo-bench scenario check {shlex.quote(str(out))}")
 

@@ -19,7 +19,7 @@ from apo_bench.cli.shared import (
     make_path_option,
     print_json,
     print_table,
-    say,
+    print_text,
 )
 from apo_bench.errors import InputError, require
 
@@ -117,7 +117,7 @@ def score_command(
                 records,
                 name=name,
                 command=line,
-                said=lambda each: say(f"{each.name}: {each.title}", as_json),
+                said=lambda each: print_text(f"{each.name}: {each.title}", as_json),
                 **how,
             )
     write_entry(entry, out)
@@ -126,12 +126,12 @@ def score_command(
 
 def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
     from apo_bench.benchmark.scoring.entry import form_of
-    from apo_bench.viz.form_text import form_table
+    from apo_bench.viz.form_text import make_table
 
     if as_json:
         print_json(form_of(entry))
         return
-    print_table(form_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
+    print_table(make_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
     if entry.overall is not None:
         few = "; too few trials for a score (--quick)" if entry.quick else ""
         typer.echo("all {:.1f} ({:.1f} to {:.1f})".format(*entry.overall) + few)

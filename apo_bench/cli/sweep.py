@@ -69,7 +69,7 @@ def sweep_command(
     """
     from apo_bench import run_sweep
     from apo_bench.benchmark.analysis import tabulate_confusion, tally
-    from apo_bench.benchmark.report.tables.methods import prediction_summary
+    from apo_bench.benchmark.report.tables.methods import summarise_predictions
     from apo_bench.cli.rates import print_rates
 
     options |= {"trials": trials, "seed": seed, "independent_seeds": independent_seeds or None}
@@ -84,7 +84,7 @@ def sweep_command(
         secret_seed_file=secret_seed_file,
     )
     print_rates(tally(records))
-    typer.echo(prediction_summary(tabulate_confusion(records)[-1]))
+    typer.echo(summarise_predictions(tabulate_confusion(records)[-1]))
     typer.echo(f"{len(records)} records in {out / 'trials.jsonl'}; report: apo-bench report {shlex.quote(str(out))}")
 
 

@@ -29,7 +29,7 @@ def view_command(
     from apo_bench.trial.rollout import scenario_story
     from apo_bench.viz.choose_viewer import choose_display, view
     from apo_bench.viz.repeat_trial import repeat_trial
-    from apo_bench.viz.trial_text import summary_lines
+    from apo_bench.viz.trial_text import format_summary
 
     is_sweep = Path(target).is_dir()
     require(
@@ -39,7 +39,7 @@ def view_command(
     display = choose_display(port)
     if is_sweep:
         record, rollout = repeat_trial(Path(target), trial, secret_seed_file)
-        print_columns(summary_lines(record, record["scenario"]))
+        print_columns(format_summary(record, record["scenario"]))
     else:
         rollout = scenario_story(build_scene(load_scenario(target)))
     view(rollout, display, port, typer.echo)

@@ -43,7 +43,7 @@ class PoseRows:
     score: Array
     """(n,), score of the estimator; NaN where the file has none."""
 
-    def spot(self, row: int) -> str:
+    def location(self, row: int) -> str:
         """Return the location of a row, for messages."""
         place = self.place[row]
         return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
@@ -64,7 +64,7 @@ def read_results(path: str | Path) -> PoseRows:
                 head = tuple(cell.strip() for cell in text.split(","))
                 require(head == _COLUMNS, f"{place}: the columns are {text[:80]}; needed are {','.join(_COLUMNS)}.")
             elif text:
-                numbers.extend((line, *_row(text, place)))
+                numbers.extend((line, *_read_row(text, place)))
     require(numbers, f"{path}: no pose stands in the file; give a first line {','.join(_COLUMNS)}, and rows below it.")
     # Columns: line, scene, image, object, score, R row by row, t, time. Integers of this size are exact in float64.
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 4 + _NUMBERS)
@@ -84,21 +84,21 @@ def check_rows(rows: PoseRows) -> PoseRows:
     if wrong.any():
         k = int(np.argmax(wrong))
         fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _NOT_A_ROTATION else "it mirrors"
-        raise InputError(f"{rows.spot(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
+        raise InputError(f"{rows.location(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
     distance = np.linalg.norm(rows.t_mm, axis=1)
     require(
         np.median(distance) >= _METRES,
-        f"{rows.spot(0)}, t: millimetres are needed, and the median distance to the camera is "
+        f"{rows.location(0)}, t: millimetres are needed, and the median distance to the camera is "
         f"{np.median(distance):.3g}; if these are metres, multiply by 1000.",
     )
     cells = np.concatenate([rows.where, rows.t_mm, rows.R.reshape(-1, 9)], axis=1)
     again = np.setdiff1d(np.arange(len(cells)), np.unique(cells, axis=0, return_index=True)[1])
     if again.size:
-        raise InputError(f"{rows.spot(int(again[0]))}: an earlier row stands there once more; keep one of the two.")
+        raise InputError(f"{rows.location(int(again[0]))}: an earlier row stands there once more; keep one of the two.")
     return rows
 
 
-def _row(text: str, place: str) -> list[float]:
+def _read_row(text: str, place: str) -> list[float]:
     """Return scene, image, object, score, the twelve numbers of R and t, and the time of one line.
 
     Args:

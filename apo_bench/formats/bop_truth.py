@@ -51,36 +51,36 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
     elif is_results:
         truth = read_results(path)
     else:
-        scene = _which_scene(path, estimates) if scene is None else scene
+        scene = _choose_scene(path, estimates) if scene is None else scene
         truth = _read_scene(path, scene)
     kept = truth.where[:, 0] == (truth.where[:, 0] if scene is None else scene)  # all rows if no scene is given
-    estimated = kept & _among(truth.where[:, :2], estimates.where[:, :2])
+    estimated = kept & _occurs_in(truth.where[:, :2], estimates.where[:, :2])
     require(
         estimated.any(),
         f"{path}: no image of {'the truth' if scene is None else f'scene {scene}'} has an estimate in "
         f"{estimates.file}; give the truth of the images that were estimated.",
     )
-    truth = _only(truth, kept if is_results else estimated)
+    truth = _select_rows(truth, kept if is_results else estimated)
     nearest = int(np.argmin(truth.t_mm[:, 2]))  # the row with the least depth
     require(
         truth.t_mm[nearest, 2] > 0.0,
-        f"{truth.spot(nearest)}, t: the third number is the depth before the camera and must be above 0.",
+        f"{truth.location(nearest)}, t: the third number is the depth before the camera and must be above 0.",
     )
     return truth
 
 
-def _only(rows: PoseRows, kept: Any) -> PoseRows:
+def _select_rows(rows: PoseRows, kept: Any) -> PoseRows:
     """Return the rows that a mask (n,) selects."""
     return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
 
 
-def _among(where: Any, known: Any) -> Any:
+def _occurs_in(where: Any, known: Any) -> Any:
     """Return which scene-image pairs, (n, 2), are among known ones, (m, 2), as a mask (n,)."""
     size = LARGEST_ID + 1  # joins scene and image into one number
     return np.isin(where[:, 0] * size + where[:, 1], known[:, 0] * size + known[:, 1])
 
 
-def _which_scene(path: Path, estimates: PoseRows) -> int:
+def _choose_scene(path: Path, estimates: PoseRows) -> int:
     """Return the scene of a `.json` file: the number of its folder, else the only estimated scene."""
     folder = path.resolve().parent.name
     if _is_number(folder):
@@ -123,7 +123,7 @@ def _is_number(name: str) -> bool:
 def _read_scene(path: Path, scene: int) -> PoseRows:
     """Read the ground truth of one scene; scores are NaN."""
     images = read_typed(path, dict[str, Any], "truth of one scene", syntax="json", limit=LARGEST_TRUTH_BYTES)
-    rows = list(_entries(path, images))
+    rows = list(_list_entries(path, images))
     require(rows, f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where = [(scene, image, entry.obj_id) for image, _, entry in rows]
     R = np.array([entry.cam_R_m2c for _, _, entry in rows]).reshape(-1, 3, 3)
@@ -133,7 +133,7 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
     return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), R, t, place, score))
 
 
-def _entries(path: Path, images: dict[str, Any]) -> Iterator[tuple[int, str, TruthEntry]]:
+def _list_entries(path: Path, images: dict[str, Any]) -> Iterator[tuple[int, str, TruthEntry]]:
     """Yield image, location and content of every entry."""
     for image, entries in images.items():
         require(_is_number(image), f"{path}: the keys are numbers of images, '{image[:40]}' was given.")

@@ -57,30 +57,30 @@ def read_table(path: str | Path, scenario: Scenario, assumed: tuple[float, float
     assembly = scenario.assembly
     rows = dict[int, CsvRow]()
     for row in read_csv(path, _COLUMNS, _REQUIRED):
-        k = _operation(row, assembly)
+        k = _read_operation(row, assembly)
         row.require(k not in rows, "operation", "every operation once is needed")
         rows[k] = row
     for k, operation in enumerate(assembly.operations):
         require(k in rows, f"{path}: the row of operation {k + 1} ({operation.main}) is missing.")
     ordered = [rows[k] for k in range(len(assembly))]
-    shift = [_deviation(row, "deviation", assumed[0] * 1e-3, SHIFT_M) for row in ordered]
-    turn = [_deviation(row, "turn deviation", math.radians(assumed[1]), TURN_RAD) for row in ordered]
+    shift = [_read_deviation(row, "deviation", assumed[0] * 1e-3, SHIFT_M) for row in ordered]
+    turn = [_read_deviation(row, "turn deviation", math.radians(assumed[1]), TURN_RAD) for row in ordered]
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
     observation = Observation(
         assembly=assembly,
         start=place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
-        poses=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
+        poses=np.array([_read_pose(row) for row in ordered]).reshape(-1, 4, 4),
         covariance=np.array([np.diag([s] * 3 + [t] * 3) ** 2 for s, t in zip(shift, turn, strict=True)]).reshape(
             -1, 6, 6
         ),
-        observed=np.array([_flag(row) for row in ordered], dtype=np.bool_),
+        observed=np.array([_read_flag(row) for row in ordered], dtype=np.bool_),
         gap_m=scenario.gap_mm * 1e-3,
-        play_m=_play(ordered, scenario.clearance_mm * 1e-3),
+        play_m=_read_play(ordered, scenario.clearance_mm * 1e-3),
     )
     return observation, not stated
 
 
-def table(assembly: Assembly, goals: Array) -> str:
+def write_csv_table(assembly: Assembly, goals: Array) -> str:
     """Return target poses (n, 4, 4), [m], as a CSV table in mm, with all digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -91,7 +91,7 @@ def table(assembly: Assembly, goals: Array) -> str:
     return text.getvalue()
 
 
-def _operation(row: CsvRow, assembly: Assembly) -> int:
+def _read_operation(row: CsvRow, assembly: Assembly) -> int:
     """Return the operation of a row, counted from 0; check that its part is the one that the operation moves."""
     text = row.text("operation")
     row.require(
@@ -108,7 +108,7 @@ def _operation(row: CsvRow, assembly: Assembly) -> int:
     return k
 
 
-def _pose(row: CsvRow) -> Array:
+def _read_pose(row: CsvRow) -> Array:
     """Return the pose of a row, (4, 4), [m]."""
     position = [row.number(name, FARTHEST_M) for name in _POSITION]
     units = {row.cells[name].unit for name in _POSITION}
@@ -118,7 +118,7 @@ def _pose(row: CsvRow) -> Array:
     return pose.unpack(np.array([*position, *q]))
 
 
-def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
+def _read_deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
     """Return a standard deviation of a row, [m] or [rad]; the assumed one if the cell is empty.
 
     Args:
@@ -132,7 +132,7 @@ def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, f
     return x
 
 
-def _play(rows: Sequence[CsvRow], assumed: float) -> float:
+def _read_play(rows: Sequence[CsvRow], assumed: float) -> float:
     """Return the clearance per side of parts that fit, [m]: the same number in all rows, or the assumed one."""
     stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
@@ -140,7 +140,7 @@ def _play(rows: Sequence[CsvRow], assumed: float) -> float:
     return stated[0][1] if stated else assumed
 
 
-def _flag(row: CsvRow) -> bool:
+def _read_flag(row: CsvRow) -> bool:
     """Return whether the operation of a row was observed; an empty cell means true."""
     text = row.text("seen").lower()
     row.require(text in _FLAGS, "seen", "true or false is needed")

@@ -30,7 +30,7 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
         require(allowed, f"{name} {deviation:g} was given; a number from {low:g} to {high:g} is allowed.")
 
 
-def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
+def note_assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
     """Return the note on a file that states no standard deviations; None means the default."""
     mm = DEVIATION_MM if deviation_mm is None else deviation_mm
     deg = DEVIATION_DEG if deviation_deg is None else deviation_deg

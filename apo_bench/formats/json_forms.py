@@ -59,12 +59,12 @@ def write_form(form: Form, path: str | Path) -> None:
     write_file(path, json.dumps(form, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def pose_form(T: Array) -> Form:
+def make_pose_form(T: Array) -> Form:
     """Return the form of a pose (4, 4), [m]: position in mm, and quaternion."""
     packed = pose.pack(T)
     return {"position_mm": (packed[:3] * 1e3).tolist(), "quaternion_wxyz": packed[3:].tolist()}
 
 
-def covariance_form(C: Array) -> Any:
+def make_covariance_form(C: Array) -> Any:
     """Return a covariance (6, 6), [m, rad], as nested lists in mm and degrees."""
     return (C * np.outer(TO_MM_DEG, TO_MM_DEG)).tolist()

@@ -66,7 +66,7 @@ def write_kit(
         files[path] = printed[name]
         if step:
             _write_step(mesh, path.with_suffix(".step"))
-    write_csv(folder / "tags.csv", ("family", "id", "edge_mm", "x_mm", "y_mm", "z_mm"), _tags())
+    write_csv(folder / "tags.csv", ("family", "id", "edge_mm", "x_mm", "y_mm", "z_mm"), _list_tags())
     lines = [(scenario.name, clearance_mm, k, method) for k in range(1, trials + 1) for method in methods]
     write_csv(folder / FORM_NAME, tuple(FORM_COLUMNS), [(*line, *[""] * (len(FORM_COLUMNS) - 4)) for line in lines])
     return files
@@ -105,12 +105,12 @@ def make_plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
     table = make_part_mesh(scenario.assembly.solids["table"], clearance_mm).apply_translation(-middle)
     plate = box(bounds=((-_PLATE_MM / 2, -_PLATE_MM / 2, -_PLATE_THICK_MM), (_PLATE_MM / 2, _PLATE_MM / 2, 0.0)))
     papers = [
-        box((_TAG_PAPER_MM, _TAG_PAPER_MM, 2 * _RECESS_MM)).apply_translation((x, y, 0)) for *_, x, y, _ in _tags()
+        box((_TAG_PAPER_MM, _TAG_PAPER_MM, 2 * _RECESS_MM)).apply_translation((x, y, 0)) for *_, x, y, _ in _list_tags()
     ]
     return difference([intersection([plate, table]), *papers])
 
 
-def _tags() -> list[tuple[str, int, float, float, float, float]]:
+def _list_tags() -> list[tuple[str, int, float, float, float, float]]:
     """Return family, id, edge and position on the plate of each tag, [mm]."""
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     return [(TAG_FAMILY, k, TAG_EDGE_MM, x * _TAG_AT_MM, y * _TAG_AT_MM, -_RECESS_MM) for k, (x, y) in enumerate(signs)]

@@ -74,7 +74,7 @@ def read_observation_file(
     return ObservationFile(observation, known, is_assumed)
 
 
-def read_stated(path: str | Path, scenario: Scenario) -> Observation:
+def read_fully_stated_observation(path: str | Path, scenario: Scenario) -> Observation:
     """Read an observation from a file that must state all standard deviations.
 
     Raises:
@@ -88,7 +88,7 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
     return observation
 
 
-def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
+def make_nominal_observation(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
     """Return the nominal poses of a scenario as an observation with these standard deviations per axis.
 
     Args:

@@ -21,8 +21,8 @@ from apo_bench.formats.json_forms import (
     PlannedOperation,
     PoseForm,
     Position,
-    covariance_form,
-    pose_form,
+    make_covariance_form,
+    make_pose_form,
 )
 from apo_bench.geometry import Array
 from apo_bench.io import FileTable, Finite, NotNegative, Positive, Text, Triple, convert_typed, read_typed
@@ -103,7 +103,7 @@ class ObservationForm(FileTable, frozen=True, kw_only=True):
     tails: TailsForm | UnsetType = UNSET
 
 
-def observation_form(observation: Observation, scenario: str) -> Form:
+def make_observation_form(observation: Observation, scenario: str) -> Form:
     """Return the JSON form of an observation.
 
     Args:
@@ -113,8 +113,8 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         ObservedOperation(
             operation=k + 1,
             part=operation.main,
-            **pose_form(observation.poses[k]),
-            covariance_mm_deg=covariance_form(observation.covariance[k]),
+            **make_pose_form(observation.poses[k]),
+            covariance_mm_deg=make_covariance_form(observation.covariance[k]),
             seen=bool(observation.observed[k]),
         )
         for k, operation in enumerate(observation.assembly.operations)
@@ -122,36 +122,36 @@ def observation_form(observation: Observation, scenario: str) -> Form:
     form = ObservationForm(
         schema="apo-bench/observation/2",
         scenario=scenario,
-        start={part: PoseForm(**pose_form(T)) for part, T in observation.start.items()},
+        start={part: PoseForm(**make_pose_form(T)) for part, T in observation.start.items()},
         gap_mm=observation.gap_m * 1e3,
         play_mm=observation.play_m * 1e3,
         operations=observed,
-        outliers=UNSET if observation.outliers is None else _outliers_form(observation.outliers),
-        shared=tuple(map(_shared_form, observation.shared)),
-        tails=UNSET if observation.tails is None else _tails_form(observation.tails),
+        outliers=UNSET if observation.outliers is None else _make_outliers_form(observation.outliers),
+        shared=tuple(map(_make_shared_form, observation.shared)),
+        tails=UNSET if observation.tails is None else _make_tails_form(observation.tails),
     )
     return dict(msgspec.to_builtins(form))
 
 
-def _outliers_form(outliers: OutlierModel) -> Any:
+def _make_outliers_form(outliers: OutlierModel) -> Any:
     """Return the form of an outlier model."""
     camera = UNSET if outliers.camera_m is None else tuple(1e3 * x for x in outliers.camera_m)
     return OutliersForm(**{key: getattr(outliers, name) for key, name in _RATES.items()}, camera_mm=camera)
 
 
-def _shared_form(error: SharedError) -> SharedForm:
+def _make_shared_form(error: SharedError) -> SharedForm:
     """Return the form of a shared error, with operations counted from 1."""
     return SharedForm(
         name=error.name,
         operations=[k + 1 for k in error.operations],
-        covariance_mm_deg=covariance_form(error.covariance),
-        frame=UNSET if error.frame is None else PoseForm(**pose_form(error.frame)),
+        covariance_mm_deg=make_covariance_form(error.covariance),
+        frame=UNSET if error.frame is None else PoseForm(**make_pose_form(error.frame)),
         local=UNSET if error.frame is None else error.local,
         correlation=UNSET if error.correlation is None else error.correlation.tolist(),
     )
 
 
-def _tails_form(tails: Tails) -> TailsForm:
+def _make_tails_form(tails: Tails) -> TailsForm:
     """Return the form of an error distribution."""
     return TailsForm(
         axes=[frame.tolist() for frame in tails.frames],
@@ -195,13 +195,15 @@ def read_json_observation(
         assembly=assembly,
         start=usual_start if isinstance(form.start, UnsetType) else _read_start(file, form.start, assembly),
         poses=np.array(poses).reshape(-1, 4, 4),
-        covariance=np.array([_stated(file, entry, assumed) for entry in form.operations]).reshape(-1, 6, 6),
+        covariance=np.array([_read_stated_covariance(file, entry, assumed) for entry in form.operations]).reshape(
+            -1, 6, 6
+        ),
         observed=np.array([entry.seen for entry in form.operations]),
         gap_m=(scenario.gap_mm if form.gap_mm is UNSET else form.gap_mm) * 1e-3,
         play_m=(scenario.clearance_mm if form.play_mm is UNSET else form.play_mm) * 1e-3,
-        outliers=None if form.outliers is UNSET else _outliers(file, form.outliers),
-        shared=tuple(_shared(file, error, len(assembly)) for error in form.shared),
-        tails=None if isinstance(form.tails, UnsetType) else _tails(file, form.tails, len(assembly)),
+        outliers=None if form.outliers is UNSET else _read_outliers(file, form.outliers),
+        shared=tuple(_read_shared_error(file, error, len(assembly)) for error in form.shared),
+        tails=None if isinstance(form.tails, UnsetType) else _read_tails(file, form.tails, len(assembly)),
     )
     # No covariance and no deviations.
     return observation, any(entry.covariance_mm_deg is UNSET is entry.deviation_mm for entry in form.operations)
@@ -228,14 +230,14 @@ def _read_start(file: str, forms: Mapping[str, PoseForm], assembly: Assembly) ->
     return {part: forms[part].matrix(f"{file}, start, {part}") for part in assembly.solids}
 
 
-def _outliers(file: str, form: Any) -> OutlierModel:
+def _read_outliers(file: str, form: Any) -> OutlierModel:
     """Return the outlier model that a form states."""
     stated = {key: value for key, value in msgspec.structs.asdict(form).items() if value is not UNSET}
     camera = {"camera_m": [1e-3 * x for x in stated.pop("camera_mm")]} if "camera_mm" in stated else {}
     return convert_typed({_RATES[key]: x for key, x in stated.items()} | camera, OutlierModel, f"{file}, outliers")
 
 
-def _shared(file: str, form: SharedForm, n: int) -> SharedError:
+def _read_shared_error(file: str, form: SharedForm, n: int) -> SharedError:
     """Return a shared error with operations counted from 0.
 
     Args:
@@ -249,14 +251,16 @@ def _shared(file: str, form: SharedForm, n: int) -> SharedError:
     return SharedError(
         name=form.name,
         operations=tuple(k - 1 for k in form.operations),
-        covariance=_covariance(form.covariance_mm_deg, f"{place}, covariance_mm_deg", definite=False),
+        covariance=_read_covariance(form.covariance_mm_deg, f"{place}, covariance_mm_deg", definite=False),
         frame=None if isinstance(form.frame, UnsetType) else form.frame.matrix(f"{place}, frame"),
         local=form.local is True,
-        correlation=None if form.correlation is UNSET else _correlation(form.correlation, m, f"{place}, correlation"),
+        correlation=None
+        if form.correlation is UNSET
+        else _read_correlation(form.correlation, m, f"{place}, correlation"),
     )
 
 
-def _correlation(rows: list[list[float]], m: int, place: str) -> Array:
+def _read_correlation(rows: list[list[float]], m: int, place: str) -> Array:
     """Return a correlation matrix, (m, m), after checking its size, symmetry and diagonal."""
     square = [len(row) for row in rows] == [m] * m
     correlation = np.array(rows if square else np.zeros((m, m)), dtype=np.float64)
@@ -265,7 +269,7 @@ def _correlation(rows: list[list[float]], m: int, place: str) -> Array:
     return correlation
 
 
-def _tails(file: str, form: TailsForm, n: int) -> Tails:
+def _read_tails(file: str, form: TailsForm, n: int) -> Tails:
     """Return the error distribution of n operations that a form states."""
     axes = np.array(form.axes, dtype=np.float64).reshape(-1, 3, 3)
     rotations = np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) <= 1e-6
@@ -280,7 +284,7 @@ def _tails(file: str, form: TailsForm, n: int) -> Tails:
     )
 
 
-def _covariance(rows: _Matrix, place: str, *, definite: bool = True) -> Array:
+def _read_covariance(rows: _Matrix, place: str, *, definite: bool = True) -> Array:
     """Return a covariance (6, 6), [m, rad], from one in mm and degrees.
 
     Args:
@@ -295,7 +299,7 @@ def _covariance(rows: _Matrix, place: str, *, definite: bool = True) -> Array:
     return (C + C.T) / 2 / np.outer(TO_MM_DEG, TO_MM_DEG)
 
 
-def _stated(file: str, entry: ObservedOperation, assumed: tuple[float, float]) -> Array:
+def _read_stated_covariance(file: str, entry: ObservedOperation, assumed: tuple[float, float]) -> Array:
     """Return the covariance of an operation, (6, 6), [m, rad]: as stated, from standard deviations, or as assumed.
 
     Args:
@@ -303,7 +307,7 @@ def _stated(file: str, entry: ObservedOperation, assumed: tuple[float, float]) -
     """
     place = f"{file}, operation {entry.operation}"
     if not isinstance(entry.covariance_mm_deg, UnsetType):
-        C = _covariance(entry.covariance_mm_deg, f"{place}, covariance_mm_deg")
+        C = _read_covariance(entry.covariance_mm_deg, f"{place}, covariance_mm_deg")
         require(is_sensible(C), f"{place}, covariance_mm_deg: the square root of a variance is out of range.")
         return C
     mm, deg = entry.deviation_mm, entry.deviation_deg

@@ -30,13 +30,13 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
         >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
         ['plate.xml']
     """
-    from apo_bench.importers.cad.part_import import import_solid, raw_solids
+    from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
     from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     written: dict[str, Path] = {}
-    for raw in raw_solids(source, unit)[1]:
+    for raw in read_raw_solids(source, unit)[1]:
         name = make_part_name(raw.name, set(written))
         written[name] = import_solid(raw, name, target, source.name).path
     return tuple(written.values())

@@ -100,10 +100,10 @@ def convert_typed(value: Any, wanted: type[T], place: str) -> T:
     try:
         return msgspec.convert(value, wanted)
     except msgspec.ValidationError as error:
-        raise InputError(_sentence(str(error), value, wanted, place)) from error
+        raise InputError(_describe_fault(str(error), value, wanted, place)) from error
 
 
-def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
+def _describe_fault(said: str, value: Any, wanted: Any, place: str) -> str:
     """Return a message of msgspec as a sentence: `mine.toml, operation 2, goal: a list is needed, 3 was given.`."""
     match = _PATH.fullmatch(said)
     assert match is not None
@@ -116,19 +116,19 @@ def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
     if missing := re.fullmatch(r"Object missing required field `(.*)`", fault):
         return f"{at}: the key '{missing[1]}' is missing."
     if unknown := re.fullmatch(r"Object contains unknown field `(.*)`", fault, re.DOTALL):
-        known = [key for table in _tables(wanted) for key in table.__struct_encode_fields__]
+        known = [key for table in _list_tables(wanted) for key in table.__struct_encode_fields__]
         near = get_close_matches(unknown[1], known, n=1, cutoff=0.5)
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         return f"{at}: unknown key '{one_line(unknown[1], _LONGEST_VALUE)}'{hint}."
     if not fault.startswith(("Expected", "Invalid", "Number")):
         return f"{at}: {fault}"
-    return f"{at}: {_needed(fault, path.rpartition('.')[2], wanted)} is needed, {show_value(value)} was given."
+    return f"{at}: {_describe_needed(fault, path.rpartition('.')[2], wanted)} is needed, {show_value(value)} was given."
 
 
-def _needed(fault: str, key: str, wanted: Any) -> str:
+def _describe_needed(fault: str, key: str, wanted: Any) -> str:
     """Return what a type allows, in words."""
     if fault.startswith("Invalid"):
-        return " or ".join(map(show_value, _choices(wanted, key)))
+        return " or ".join(map(show_value, _list_choices(wanted, key)))
     if "matching regex" in fault:
         return "a text without control characters"
     needed = re.sub(r", got .*", "", fault).removeprefix("Expected ")
@@ -138,19 +138,19 @@ def _needed(fault: str, key: str, wanted: Any) -> str:
     return re.sub(r"a number [<>]= -?1e\+300|Number out of range", "a finite number", needed)  # the bounds of `Finite`
 
 
-def _tables(wanted: Any) -> Iterator[type[msgspec.Struct]]:
+def _list_tables(wanted: Any) -> Iterator[type[msgspec.Struct]]:
     """Yield all tables that a type contains."""
     inside = get_args(wanted)
     if isinstance(wanted, type) and issubclass(wanted, msgspec.Struct):
         yield wanted
         inside = tuple(get_type_hints(wanted).values())
     for inner in inside:
-        yield from _tables(inner)
+        yield from _list_tables(inner)
 
 
-def _choices(wanted: Any, key: str) -> Iterator[Any]:
+def _list_choices(wanted: Any, key: str) -> Iterator[Any]:
     """Yield the values that a key of some table may have, if it is a tag or a `Literal`."""
-    for table in _tables(wanted):
+    for table in _list_tables(wanted):
         if table.__struct_config__.tag_field == key:
             yield table.__struct_config__.tag
         hint = get_type_hints(table).get(key)

@@ -25,22 +25,22 @@ def list_named_files(mjcf: Path) -> tuple[Path, ...]:
     while todo:
         model = todo.pop(0)
         folders[model.parent] = None
-        for element in _elements(model):
+        for element in _list_elements(model):
             folders |= {mjcf.parent / text: None for key in _FOLDERS if (text := element.get(key))}
             named = [text for key, text in element.attrib.items() if key.startswith("file")]
             if element.tag not in _MODELS:
                 names |= dict.fromkeys(named)
                 continue
-            for file in _found(named, (mjcf.parent, model.parent)):
+            for file in _find_file(named, (mjcf.parent, model.parent)):
                 if file.resolve() not in models:
                     models[file.resolve()] = file
                     todo.append(file)
     # with MuJoCo's option strippath only the last part of a name counts
     both = (each for name in names for each in (name, PurePosixPath(name).name))
-    return tuple(dict.fromkeys([*models.values(), *_found(both, folders)]))
+    return tuple(dict.fromkeys([*models.values(), *_find_file(both, folders)]))
 
 
-def _elements(model: Path) -> Iterable[ElementTree.Element]:
+def _list_elements(model: Path) -> Iterable[ElementTree.Element]:
     """Return all elements of an MJCF file; none of an unreadable file, which MuJoCo reports."""
     try:
         return ElementTree.fromstring(read_bytes(model, "MJCF file", _LARGEST_BYTES)).iter()
@@ -48,7 +48,7 @@ def _elements(model: Path) -> Iterable[ElementTree.Element]:
         return ()
 
 
-def _found(names: Iterable[str], folders: Iterable[Path]) -> list[Path]:
+def _find_file(names: Iterable[str], folders: Iterable[Path]) -> list[Path]:
     """Return the existing files of these names in these folders."""
     places = tuple(folders)
     return [place / name for name in names for place in places if name and (place / name).is_file()]

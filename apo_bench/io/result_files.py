@@ -28,7 +28,7 @@ def replace_file(path: str | Path) -> Iterator[IO[bytes]]:
     path = Path(path)
     check_target(path)
     part = path.with_name(f".{secrets.token_hex(8)}.part")
-    before = _mode(path)
+    before = _get_file_mode(path)
     try:
         if before is not None and not os.access(path, os.W_OK):
             raise PermissionError("permission denied")
@@ -72,12 +72,12 @@ def open_to_append(path: Path) -> IO[bytes]:
 
 def check_target(path: Path) -> None:
     """Raise an `InputError` if a path to be written exists and is no ordinary file."""
-    mode = _mode(path)
+    mode = _get_file_mode(path)
     if mode is not None and not stat.S_ISREG(mode):
         raise InputError(f"{path} is {kind_of(mode)}, and only an ordinary file is written over; remove it.")
 
 
-def _mode(path: Path) -> int | None:
+def _get_file_mode(path: Path) -> int | None:
     """Return the mode at a path, without following links; None if nothing exists there."""
     try:
         return os.lstat(path).st_mode

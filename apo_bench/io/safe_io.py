@@ -30,16 +30,16 @@ def open_file(path: str | Path, kind: str) -> Iterator[BinaryIO]:
     except ValueError as error:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
     except OSError as error:
-        raise _unreadable(path, kind, error) from error
+        raise _unreadable_error(path, kind, error) from error
     require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give {add_article(kind)}.")
     try:
         with open(path, "rb", _BUFFER) as file:
             yield file
     except OSError as error:
-        raise _unreadable(path, kind, error) from error
+        raise _unreadable_error(path, kind, error) from error
 
 
-def _unreadable(path: str | Path, kind: str, error: OSError) -> InputError:
+def _unreadable_error(path: str | Path, kind: str, error: OSError) -> InputError:
     return InputError(f"{path}: the {kind} cannot be read ({error.strerror or error}); check the path.")
 
 

@@ -12,7 +12,7 @@ class Unusable(Exception):
     """The program cannot print, or has no current folder; the message is one sentence."""
 
 
-def prepare() -> str:
+def prepare_streams() -> str:
     """Make the standard streams accept any text, and return the current folder.
 
     Raises:
@@ -31,7 +31,7 @@ def prepare() -> str:
         ) from error
 
 
-def finish() -> None:
+def flush_and_finish() -> None:
     """Flush standard output; a pipe that its reader has closed is no error.
 
     Raises:
@@ -40,20 +40,20 @@ def finish() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        give_up_output()
+        discard_output()
     except OSError as error:
-        give_up_output()
+        discard_output()
         raise Unusable(
             f"standard output could not be written ({error.strerror}); what was not printed is lost."
         ) from error
 
 
-def give_up_output() -> None:
+def discard_output() -> None:
     """Discard all further output, so that nothing fails at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
-def unexpected(error: OSError) -> str:
+def describe_unexpected_error(error: OSError) -> str:
     """Return the sentence about a file error that the program does not expect at that place."""
     if error.filename is not None:
         return f"{error.filename}: {error.strerror}."

@@ -11,10 +11,10 @@ def format_toml(document: Mapping[str, Any]) -> str:
     Args:
         document: Keys without dots and quotes; each table in it, and each of a list of tables, becomes a section.
     """
-    return "\n".join(_lines(document, "")) + "\n"
+    return "\n".join(_list_lines(document, "")) + "\n"
 
 
-def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
+def _list_lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
     """Yield the lines of a table: first its plain keys, then its sections, whose names begin with `prefix`."""
     sections = []
     for key, value in table.items():
@@ -26,4 +26,4 @@ def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
             # JSON and TOML write texts, numbers, booleans and lists in the same way
             yield f"{key} = {json.dumps(value, ensure_ascii=False)}"
     for head, value, inner in sections:
-        yield from ("", head, *_lines(value, inner))
+        yield from ("", head, *_list_lines(value, inner))

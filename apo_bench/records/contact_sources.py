@@ -63,7 +63,7 @@ def parse_face_offset(text: str) -> float:
     return offset_mm
 
 
-def checked_contact_source(text: str) -> str:
+def check_contact_source(text: str) -> str:
     """Return the canonical name of a contact source, or raise an `InputError` if there is no such source."""
     require_text("contact source", text)
     name = normalise_contact_source(text)

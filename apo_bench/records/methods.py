@@ -58,7 +58,7 @@ def parse_method(method: str) -> Method:
     return Method(method.removesuffix(_SPIRAL), spiral=method.endswith(_SPIRAL))
 
 
-def checked_method(method: str) -> str:
+def check_method(method: str) -> str:
     """Return the canonical name of a method: `uncorrected+spiral` becomes `spiral-search`.
 
     Raises:

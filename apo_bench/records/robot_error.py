@@ -69,7 +69,7 @@ def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
         kind, _, sizes = entry.partition(":")
         require_known(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS))
         require(kind not in sigmas, f"the {called} '{name}' was given, which has {kind} twice; state it once.")
-        sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
+        sigmas[kind] = _read_numbers(f"{called} '{name}'", kind, sizes)
     hand_eye, joints, tool, in_hand, *others = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
     return Sigmas(hand_eye, joints[0], tool[0], in_hand, *(size for size, _ in others))
 
@@ -80,7 +80,7 @@ def normalise_robot_error(name: str) -> str:
     Raises:
         InputError: As in `parse_robot_error`.
     """
-    return _spell(parse_robot_error(name))
+    return _spell_sigmas(parse_robot_error(name))
 
 
 def normalise_assumed_robot_error(name: str) -> str:
@@ -94,7 +94,7 @@ def normalise_assumed_robot_error(name: str) -> str:
         return name
     if ":" not in name:
         require_known("assumed robot error", name, (MATCHED, _UNKNOWN, NO_ROBOT_ERROR, *_UNITS))
-    return _spell(parse_robot_error(name, "assumed robot error"))
+    return _spell_sigmas(parse_robot_error(name, "assumed robot error"))
 
 
 def parse_assumed_error(assumed_robot_error: str, robot_error: str) -> str | None:
@@ -108,7 +108,7 @@ def parse_assumed_error(assumed_robot_error: str, robot_error: str) -> str | Non
     return robot_error if assumed_robot_error == MATCHED else assumed_robot_error
 
 
-def _numbers(given: str, kind: str, sizes: str) -> tuple[float, float]:
+def _read_numbers(given: str, kind: str, sizes: str) -> tuple[float, float]:
     """Parse the one or two numbers of a kind; the second is 0 by default."""
     units = _UNITS[kind]
     try:
@@ -125,7 +125,7 @@ def _numbers(given: str, kind: str, sizes: str) -> tuple[float, float]:
     return first, second
 
 
-def _spell(sigmas: Sigmas) -> str:
+def _spell_sigmas(sigmas: Sigmas) -> str:
     """Return the canonical name of standard deviations, without kinds that are zero."""
     kinds = zip(_UNITS, ((*s, 0.0)[:2] if isinstance(s, tuple) else (s, 0.0) for s in sigmas), strict=True)
     return "+".join(f"{kind}:{spell_sizes(sizes)}" for kind, sizes in kinds if any(sizes)) or NO_ROBOT_ERROR

@@ -8,9 +8,9 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import require
-from apo_bench.records.contact_sources import checked_contact_source
+from apo_bench.records.contact_sources import check_contact_source
 from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, normalise_ft_sensor
-from apo_bench.records.methods import CORRECTOR, checked_method, probes
+from apo_bench.records.methods import CORRECTOR, check_method, probes
 from apo_bench.records.robot_error import (
     MATCHED,
     NO_ROBOT_ERROR,
@@ -168,7 +168,7 @@ class TrialConfig:
         metadata=about(
             "Where the corrector's contacts come from: given (correct), detected, detected-jointly, or wrong ones: "
             "false-negative, false-positive, face-offset:3mm",
-            spelled=checked_contact_source,
+            spelled=check_contact_source,
             key=True,
             axis=True,
         ),
@@ -181,7 +181,7 @@ class TrialConfig:
             "contact-robust or another corrector (`apo-bench method list`), package.module:name, uncorrected (observed "
             "poses), nominal (poses of the scenario file), oracle (true poses), spiral-search; +spiral and +probe add "
             "a spiral search and probing",
-            spelled=checked_method,
+            spelled=check_method,
             key=True,
             axis=True,
             swept=("oracle", "uncorrected", "paper", CORRECTOR),

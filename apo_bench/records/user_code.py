@@ -29,12 +29,12 @@ DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
 """Column -> prefixes of names with a colon that are no code."""
 
 
-def own_code(record: Mapping[str, Any]) -> tuple[str, ...]:
+def list_user_code(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of user code in a record; files of noise models and scenarios are data, not code."""
-    names = [record[column] for column in DATA_PREFIXES if is_own_code(column, record[column])]
+    names = [record[column] for column in DATA_PREFIXES if is_user_code(column, record[column])]
     return tuple(dict.fromkeys(names))
 
 
-def is_own_code(column: str, name: str) -> bool:
+def is_user_code(column: str, name: str) -> bool:
     """Return whether a name in a column is `module:name`, and begins with none of the `DATA_PREFIXES`."""
     return ":" in name and not name.startswith(DATA_PREFIXES[column])

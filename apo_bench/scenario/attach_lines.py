@@ -24,7 +24,7 @@ def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
     return describe_operation_macros(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
 
 
-def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
+def add_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
     """Return the scenario with the insertion axis of every operation.
 
     Args:
@@ -39,11 +39,11 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
         scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated
     )
     for each, preference in zip(operations, stated, strict=True):
-        _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
+        _check_stated_line(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in operations))
 
 
-def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
+def _check_stated_line(after: Arrival, stated: Preference, key: str, main: str) -> None:
     """Raise an `InputError` if a stated direction or length of an insertion is impossible.
 
     Args:

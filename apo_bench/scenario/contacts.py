@@ -44,11 +44,12 @@ def read_contacts(
         at = f"{place}, contacts, contact {i}"
         table = entry if isinstance(entry, ContactTable) else ContactTable(faces=entry)
         contact = Contact(
-            _face(table.faces[0], f"{at}, first", solids, moves[0]), _face(table.faces[1], f"{at}, second", solids)
+            _find_face(table.faces[0], f"{at}, first", solids, moves[0]),
+            _find_face(table.faces[1], f"{at}, second", solids),
         )
         _check_contact(contact, at, moves, solids, there)
         require(contact not in contacts, f"{at}: '{contact}' stands here twice; keep one.")
-        contacts[contact] = _gap(table, at, contact, solids)
+        contacts[contact] = _read_gap(table, at, contact, solids)
     return contacts
 
 
@@ -68,7 +69,7 @@ def check_kinds(place: str, gaps: Sequence[ContactGaps]) -> None:
             )
 
 
-def _face(name: str, place: str, solids: Mapping[str, Solid], main: str | None = None) -> PartFace:
+def _find_face(name: str, place: str, solids: Mapping[str, Solid], main: str | None = None) -> PartFace:
     """The face of a name `part.face`, or of `face` alone, which is a face of the main part."""
     part, dot, face = name.rpartition(".")
     require(dot or main, f"{place}: a face as 'part.face' is needed, '{name}' was given.")
@@ -90,11 +91,11 @@ def _check_contact(
     a, b = (solids[of.part].face(of.face) for of in contact)
     require(
         classify_contact(a, b) is not None,
-        f"{place}: '{contact}': {_described(a)} and {_described(b)} make no contact.",
+        f"{place}: '{contact}': {_describe_face(a)} and {_describe_face(b)} make no contact.",
     )
 
 
-def _described(face: Face | RoundFace) -> str:
+def _describe_face(face: Face | RoundFace) -> str:
     """The kind of a face in words, such as `a hole of 10 mm`."""
     if isinstance(face, Face):
         return "a flat face"
@@ -105,7 +106,7 @@ def _described(face: Face | RoundFace) -> str:
     return f"{what}{'hole' if face.hole else 'shaft'} of {2e3 * face.radius:g} mm"
 
 
-def _gap(table: ContactTable, place: str, contact: Contact, solids: Mapping[str, Solid]) -> Gap:
+def _read_gap(table: ContactTable, place: str, contact: Contact, solids: Mapping[str, Solid]) -> Gap:
     """Return the gap of a contact: its kind, and the stated interval in [m]."""
     a, b = (solids[of.part].face(of.face) for of in contact)
     if table.gap_mm is None:

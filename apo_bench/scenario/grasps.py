@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Grasp
 from apo_bench.scenario.tables import GraspTable
 from apo_bench.scenario.values import normalize_axis
 
-_RAISED = 0.15
+_RAISED_M = 0.15
 """Height of a default grasp above the middle of the part, as a fraction of the height of the part."""
 _OPENING_M = 0.046
 """Largest opening of each finger of the default arm."""
@@ -43,25 +43,25 @@ def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: 
         before: (4, 4), pose of the part when it is picked.
     """
     if stated.ahead is not None:
-        return _tilted(stated, place, solid, before)
-    point = _above_middle(solid, before) if stated.at_mm is None else 1e-3 * np.array(stated.at_mm)
+        return _read_tilted_grasp(stated, place, solid, before)
+    point = _find_point_above_middle(solid, before) if stated.at_mm is None else 1e-3 * np.array(stated.at_mm)
     across = None if stated.across is None else normalize_axis(stated.across, f"{place}, across")
     if stated.at_mm is not None:
         _check_within_reach(point, f"{place}, at_mm", solid, before)
     if across is not None:
         level = abs((before[:3, :3] @ across)[2]) <= _LEVEL
         require(level, f"{place}, across: an axis that is level where the part is picked is needed.")
-    grasp = _across_boxes(point, across, solid, before)
+    grasp = _complete_box_grasp(point, across, solid, before)
     complete = stated.at_mm is not None and across is not None
     if grasp and (complete or _holds_box(solid, grasp, before)):
         ends = measure_extent(solid.pieces, grasp.across)
         narrow = ends[1] - ends[0] <= _MOST_HELD_M
         if stated != GraspTable() or narrow or not find_holds(solid, np.round(before[2, :3], 9), _OPENING_M):
             return grasp
-    return _by_shape(stated, across, place, part, solid, before)
+    return _find_grasp_by_shape(stated, across, place, part, solid, before)
 
 
-def _across_boxes(point: Array, across: Array | None, solid: Solid, before: Array) -> Grasp | None:
+def _complete_box_grasp(point: Array, across: Array | None, solid: Solid, before: Array) -> Grasp | None:
     """The grasp at a point across the stated axis, else across the narrower horizontal axis of the part.
 
     None if no axis is stated and the part has fewer than two horizontal axes.
@@ -83,7 +83,7 @@ def _check_within_reach(point: Array, place: str, solid: Solid, before: Array) -
         raise InputError(f"{place}: a point of the part, or up to {1e3 * PAD_M[1]:g} mm over it, is needed: {span} mm.")
 
 
-def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Grasp:
+def _read_tilted_grasp(stated: GraspTable, place: str, solid: Solid, before: Array) -> Grasp:
     """A tilted grasp, with fingers that point along `ahead`; the file must state all of it."""
     if stated.at_mm is None or stated.across is None or stated.ahead is None:
         raise InputError(f"{place}, ahead: 'at_mm' and an axis 'across' are needed with it.")
@@ -109,7 +109,9 @@ def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
     return all_boxes(solid.pieces) and holds_whole_width(solid.pieces, grasp.point, grasp.across, np.round(T[2, :3], 9))
 
 
-def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, solid: Solid, T: Array) -> Grasp:
+def _find_grasp_by_shape(
+    stated: GraspTable, across: Array | None, place: str, part: str, solid: Solid, T: Array
+) -> Grasp:
     """The best grasp that the shape offers, across the stated axis if there is one.
 
     With a stated point the grasp is at that point, across the axis of the nearest grasp of the shape.
@@ -129,9 +131,9 @@ def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, s
     return Grasp(point, min(grasps, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)
 
 
-def _above_middle(solid: Solid, T: Array) -> Array:
+def _find_point_above_middle(solid: Solid, T: Array) -> Array:
     """A point (3,) above the middle of the part, frame of the part, so that fingertips clear the ground below it."""
     low, high = solid.bounds
     up = T[2, :3]
-    point: Array = (low + high) / 2 + _RAISED * (np.abs(up) @ (high - low)) * up
+    point: Array = (low + high) / 2 + _RAISED_M * (np.abs(up) @ (high - low)) * up
     return np.clip(point, low, high)

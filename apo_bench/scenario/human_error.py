@@ -8,11 +8,11 @@ from apo_bench.assembly import Assembly, Layout, Operation, Poses, compute_place
 from apo_bench.geometry import Array
 from apo_bench.scenario.scenario import Scenario
 
-NOTHING_M = 1e-9
+NEGLIGIBLE_M = 1e-9
 """A smaller displacement counts as none."""
 _SWEEPS = 40
 """Largest number of sweeps over the guiding faces; oblique faces need several until they agree."""
-_AGREED_M = 1e-12
+_CONVERGED_M = 1e-12
 """The sweeps end when all guiding faces agree within this."""
 
 _Displaced = dict[str, Array]
@@ -50,9 +50,9 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
         if k == scenario.human_error.operation:
             offsets[k] = offset
         elif k < len(assembly) - 1:
-            offsets[k] = R.T @ _guided(assembly, operation, stages[k + 1], displaced)
+            offsets[k] = R.T @ _measure_guided_shift(assembly, operation, stages[k + 1], displaced)
         # R @ R_before^t: rotation of the main part by this operation, world.
-        displaced = _displaced(operation, R @ stages[k][operation.main][:3, :3].T, R @ offsets[k], displaced)
+        displaced = _displace_parts(operation, R @ stages[k][operation.main][:3, :3].T, R @ offsets[k], displaced)
     return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
 
 
@@ -69,7 +69,7 @@ def compute_human_error_covariance(scenario: Scenario, human_error_scale: float)
     return covariance
 
 
-def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
+def _measure_guided_shift(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
     """Return the displacement of a part that is guided by faces of displaced parts, (3,), world, [m]."""
     shift = np.zeros(3)
     touched = find_touched_contacts(assembly, operation.contacts, operation.moves, poses)
@@ -78,12 +78,12 @@ def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _
     for _ in range(_SWEEPS):
         for each in guides:
             shift += each.normal * (each.normal @ (displaced[each.rests] - shift))
-        if all(abs(each.normal @ (displaced[each.rests] - shift)) < _AGREED_M for each in guides):
+        if all(abs(each.normal @ (displaced[each.rests] - shift)) < _CONVERGED_M for each in guides):
             break
     return shift
 
 
-def _displaced(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:
+def _displace_parts(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:
     """The displaced parts after an operation.
 
     Args:
@@ -95,4 +95,4 @@ def _displaced(operation: Operation, turn: Array, error: Array, before: _Displac
     after = {**before, operation.main: error}
     for part in operation.carries:
         after[part] = turn @ (before.get(part, np.zeros(3)) - main) + error
-    return {part: by for part, by in after.items() if np.linalg.norm(by) > NOTHING_M}
+    return {part: by for part, by in after.items() if np.linalg.norm(by) > NEGLIGIBLE_M}

@@ -71,10 +71,10 @@ def place_layout(
     for turn, angle in zip(scenario.turns, angles, strict=True):
         goals[turn.operation] = goals[turn.operation] @ turn.by(angle)
     start = {part: T_world_assembly @ T if part in scenario.follows_site else T for part, T in scenario.start.items()}
-    return Layout(goals, {part: _at_rest(scenario, part, T, 1e-3 * clearance_mm) for part, T in start.items()})
+    return Layout(goals, {part: _lower_to_rest(scenario, part, T, 1e-3 * clearance_mm) for part, T in start.items()})
 
 
-def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
+def _lower_to_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
     """The start pose (4, 4) of a part with clearance: lowered until its lowest point is at that of the nominal part."""
     solid = scenario.assembly.solids[part]
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not solid.fits:

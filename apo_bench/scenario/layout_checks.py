@@ -10,7 +10,7 @@ from apo_bench.assembly import Contact, Layout, Poses, classify_contact, compute
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Face, compute_overlap, measure_angle, measure_intrusion, measure_mate, pose
 from apo_bench.scenario.layout import place_layout
-from apo_bench.scenario.operation_order import check_order, find_part_in_the_air
+from apo_bench.scenario.operation_order import check_order, find_floating_part
 from apo_bench.scenario.play import without_play
 from apo_bench.scenario.scenario import Scenario
 
@@ -27,7 +27,7 @@ _Faults = Iterator[tuple[str, str]]
 """Key in the file that causes a fault, and the fault as a sentence."""
 
 
-class _Case(NamedTuple):
+class _LayoutCase(NamedTuple):
     """A layout to check."""
 
     layout: Layout
@@ -48,56 +48,58 @@ def check_layouts(scenario: Scenario, file: str) -> None:
     tight = without_play(scenario.assembly, scenario.clearance_mm)
     require(tight is None, f"{file}, operations, contacts: {tight}; make the hole wider, or fit with a clearance.")
     apart: set[_Pair] = set()
-    for case in _cases(scenario):
+    for case in _list_layout_cases(scenario):
         stages = (case.layout.start, *compute_placements(scenario.assembly, case.layout.start, case.layout.poses))
         if not case.key:
             check_order(scenario.assembly, stages, file)
-        for key, fault in _faults(scenario, case, stages, apart):
+        for key, fault in _list_faults(scenario, case, stages, apart):
             raise InputError(f"{file}, {case.key or key}: {fault}{case.words}.")
 
 
-def _cases(scenario: Scenario) -> Iterator[_Case]:
+def _list_layout_cases(scenario: Scenario) -> Iterator[_LayoutCase]:
     """Yield the layouts to check: nominal, both ends of every shift and turn, and the corners of the site."""
     site = scenario.site
     x, y = site.center_m
     middle = sum(site.yaw_rad) / 2
-    yield _Case(place_layout(scenario, x, y, middle))
+    yield _LayoutCase(place_layout(scenario, x, y, middle))
     for i, shift in enumerate(scenario.shifts):
         for length in (shift.low_m, shift.high_m):
             shifts = [length if j == i else 0.0 for j in range(len(scenario.shifts))]
             words = f" when it is varied by {1e3 * length:g} mm"
-            yield _Case(place_layout(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
+            yield _LayoutCase(
+                place_layout(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words
+            )
     for i, turn in enumerate(scenario.turns):
         for angle in (turn.low_rad, turn.high_rad):
             turns = [angle if j == i else 0.0 for j in range(len(scenario.turns))]
             words = f" when it is turned by {np.degrees(angle):g} degrees"
-            yield _Case(
+            yield _LayoutCase(
                 place_layout(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
             )
     for i, j, yaw in product((-1, 1), (-1, 1), sorted({middle, *site.yaw_rad})):
         x = site.center_m[0] + i * site.spread_m[0]
         y = site.center_m[1] + j * site.spread_m[1]
         words = f" when the site is at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
-        yield _Case(place_layout(scenario, x, y, yaw), "site", words, site_only=True)
+        yield _LayoutCase(place_layout(scenario, x, y, yaw), "site", words, site_only=True)
 
 
-def _faults(scenario: Scenario, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
+def _list_faults(scenario: Scenario, case: _LayoutCase, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
     """Yield all faults of one layout.
 
     Args:
         stages: Poses of all parts at the start and after each operation.
         apart: Pairs of parts that were found apart before; extended.
     """
-    airborne = find_part_in_the_air(scenario.assembly, case.layout.start)
+    airborne = find_floating_part(scenario.assembly, case.layout.start)
     if airborne is not None:
         part, sentence = airborne
         yield f"parts, {part}, start, at_mm", sentence
-    yield from _tilted_parts(scenario, stages)
-    yield from _open_contacts(scenario, case, stages)
-    yield from _intrusions(scenario, stages, apart)
+    yield from _find_tilted_parts(scenario, stages)
+    yield from _find_open_contacts(scenario, case, stages)
+    yield from _find_overlaps(scenario, stages, apart)
 
 
-def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
+def _find_tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
     """Yield operations that tilt a part, since the robot turns parts about the vertical only."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
@@ -109,19 +111,19 @@ def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
             )
 
 
-def _open_contacts(scenario: Scenario, case: _Case, stages: tuple[Poses, ...]) -> _Faults:
+def _find_open_contacts(scenario: Scenario, case: _LayoutCase, stages: tuple[Poses, ...]) -> _Faults:
     """Yield contacts that are not closed after the operation that makes them."""
     standing = scenario.assembly.fixed - scenario.follows_site
     for k, operation in enumerate(scenario.assembly.operations):
         for number, contact in enumerate(operation.contacts, start=1):
             # If only the site moves, a contact changes only if its environment part does not move with the site.
             if not case.site_only or contact.environment.part in standing:
-                fault = _find_gap(scenario, contact, stages[k + 1])
+                fault = _describe_open_contact(scenario, contact, stages[k + 1])
                 if fault is not None:
                     yield f"operation {k + 1}, contacts, contact {number}", f"'{contact}': {fault}"
 
 
-def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
+def _describe_open_contact(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
     """The reason why a contact is not closed, in words: tilt, gap or no overlap; None if it is closed."""
     a, b = map(scenario.assembly.face_of, contact)
     T_a, T_b = (poses[of.part] for of in contact)
@@ -145,22 +147,22 @@ def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
     return None if common else "the faces do not overlap"
 
 
-def _intrusions(scenario: Scenario, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
+def _find_overlaps(scenario: Scenario, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
     """Yield pairs of parts that overlap at the start or after an operation."""
     solids = scenario.assembly.solids
     for a, b in combinations(solids, 2):
-        depth = _depth(scenario, (a, b), stages[0], apart)
+        depth = _measure_overlap_depth(scenario, (a, b), stages[0], apart)
         if depth > DEEP_M:
             yield f"parts, {b}, start", f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other at the start"
     for k, operation in enumerate(scenario.assembly.operations):
         for a, b in product(operation.moves, [part for part in solids if part not in operation.moves]):
-            depth = _depth(scenario, (a, b), stages[k + 1], apart)
+            depth = _measure_overlap_depth(scenario, (a, b), stages[k + 1], apart)
             if depth > DEEP_M:
                 sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other after operation {k + 1}"
                 yield f"operation {k + 1}, goal", sentence
 
 
-def _depth(scenario: Scenario, pair: tuple[str, str], poses: Poses, apart: set[_Pair]) -> float:
+def _measure_overlap_depth(scenario: Scenario, pair: tuple[str, str], poses: Poses, apart: set[_Pair]) -> float:
     """The depth of overlap of two parts, [m]; 0 if `apart` contains the pair at its present relative pose."""
     a, b = pair
     known = (a, b, (np.round(pose.inverse(poses[a]) @ poses[b], 9) + 0.0).tobytes())

@@ -21,7 +21,7 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
         InputError: The first fault that is found.
     """
     for k, operation in enumerate(assembly.operations):
-        loose = _loose(assembly, k)
+        loose = _find_loose_carried_part(assembly, k)
         require(
             loose is None,
             f"{file}, operation {k + 1}, carries: '{loose}' is carried, but no contact that stands at that time "
@@ -33,7 +33,7 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
             f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
             "this operation out.",
         )
-        left = _left_in_the_air(assembly, k)
+        left = _find_part_without_contact(assembly, k)
         require(
             left is None,
             f"{file}, operation {k + 1}, carries: after it '{left}' rests on nothing that a contact names; "
@@ -41,34 +41,41 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
         )
 
 
-def _left_in_the_air(assembly: Assembly, k: int) -> str | None:
+def _find_part_without_contact(assembly: Assembly, k: int) -> str | None:
     """The first part that was placed and has no contact left after operation k, counted from 0; None if none."""
     put = {part for operation in assembly.operations[: k + 1] for part in operation.moves}
     known = assembly.first(k + 1)
-    held = {part for relation in known.relations() if relation.lost is None for part in _ends(relation.contact)}
+    held = {
+        part
+        for relation in known.relations()
+        if relation.lost is None
+        for part in _list_parts_of_contact(relation.contact)
+    }
     return next((part for part in assembly.solids if part in put - held), None)
 
 
-def _loose(assembly: Assembly, k: int) -> str | None:
+def _find_loose_carried_part(assembly: Assembly, k: int) -> str | None:
     """The first carried part of operation k that no chain of contacts connects with the main part; None if none."""
     operation = assembly.operations[k]
-    standing = [_ends(relation.contact) for relation in assembly.first(k).relations() if relation.lost is None]
+    standing = [
+        _list_parts_of_contact(relation.contact) for relation in assembly.first(k).relations() if relation.lost is None
+    ]
     together = {operation.main}
     for _ in operation.carries:
         together |= {part for ends in standing if ends & together for part in ends & {*operation.carries}}
     return next((part for part in operation.carries if part not in together), None)
 
 
-def _ends(contact: Contact) -> set[str]:
+def _list_parts_of_contact(contact: Contact) -> set[str]:
     """The two parts of a contact."""
     return {contact.manipulated.part, contact.environment.part}
 
 
-AIR_M = 1e-4
+LARGEST_START_GAP_M = 1e-4
 """A part that starts lower above its support settles within the first simulation steps."""
 
 
-def find_part_in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
+def find_floating_part(assembly: Assembly, start: Poses, most_m: float = LARGEST_START_GAP_M) -> tuple[str, str] | None:
     """Find the first movable part that starts more than `most_m` above its support.
 
     Returns:

@@ -14,7 +14,7 @@ from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.parts import find_part_path, load_part
-from apo_bench.scenario.parts.fit_faces import with_fit
+from apo_bench.scenario.parts.fit_faces import mark_fit_faces
 from apo_bench.scenario.parts.limits import FACE_OR_PART_NAME
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, VaryTable
@@ -76,7 +76,7 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
             path = file.parent / find_part_path(table.file)
             if path not in solids:
                 solids[path] = load_part(path, checked)
-            solid = with_fit(solids[path], table.fit) if table.fit else solids[path]
+            solid = mark_fit_faces(solids[path], table.fit) if table.fit else solids[path]
             parts[name] = PartEntry(table, path, solid)
         except InputError as error:
             raise InputError(f"{place}: {error}") from error
@@ -97,7 +97,7 @@ def read_operations(
     entries: list[OperationEntry] = []
     for k, table in enumerate(tables):
         place = f"{file}, operation {k + 1}"
-        entry = _entry(table, k, place, parts, poses, there)
+        entry = _read_operation(table, k, place, parts, poses, there)
         entries.append(entry)
         check_kinds(place, [earlier.gaps for earlier in entries])
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
@@ -106,7 +106,7 @@ def read_operations(
     return tuple(entries)
 
 
-def _entry(
+def _read_operation(
     table: OperationTable,
     k: int,
     place: str,
@@ -136,9 +136,9 @@ def _entry(
         operation=Operation(main, tuple(gaps), table.carries),
         gaps=gaps,
         goal=table.goal.matrix,
-        attach=_attach(table.attach, f"{place}, attach"),
+        attach=_read_attach(table.attach, f"{place}, attach"),
         grasp=read_grasp(table.grasp, f"{place}, grasp", main, solids[main], poses[main]),
-        varies=tuple(_vary(each, k, f"{place}, vary") for each in varies),
+        varies=tuple(_read_variation(each, k, f"{place}, vary") for each in varies),
     )
 
 
@@ -148,13 +148,13 @@ def _check_movable(name: str, place: str, parts: Mapping[str, PartEntry]) -> Non
     require(not parts[name].table.fixed, f"{place}: '{name}' is fixed and cannot be moved; move another part.")
 
 
-def _attach(table: AttachTable, place: str) -> Preference:
+def _read_attach(table: AttachTable, place: str) -> Preference:
     """The stated direction and length [m] of an insertion; None for each that is not stated."""
     direction = None if table.along is None else normalize_axis(table.along, f"{place}, along")
     return Preference(direction, None if table.travel_mm is None else 1e-3 * table.travel_mm)
 
 
-def _vary(table: VaryTable, operation: int, place: str) -> Shift | Turn:
+def _read_variation(table: VaryTable, operation: int, place: str) -> Shift | Turn:
     """The shift or turn of a `vary` entry."""
     if table.along is not None and table.mm is not None and table.about is None and table.deg is None:
         low, high = check_span(table.mm, f"{place}, mm")

@@ -17,7 +17,7 @@ from apo_bench.io import UNSHOWN, convert_typed, read_typed
 from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
-from apo_bench.scenario.attach_lines import with_attach_lines
+from apo_bench.scenario.attach_lines import add_attach_lines
 from apo_bench.scenario.generated import complete_name, is_generated, make_generated_file
 from apo_bench.scenario.layout_checks import check_layouts
 from apo_bench.scenario.part_and_operation_entries import OperationEntry, read_operations, read_parts
@@ -56,25 +56,25 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
         return given
     if isinstance(given, str) and is_named(given):
         return _load_named(complete_name(given) if is_generated(given) else given)
-    return _read(find_scenario_path(given))
+    return _read_file(find_scenario_path(given))
 
 
 @lru_cache(maxsize=128)
 def _load_named(name: str) -> Scenario:
     """Load a scenario of the package or a generated one; part files of the latter need no check."""
-    return replace(_read(find_scenario_path(name), checked=not is_generated(name)), name=name)
+    return replace(_read_file(find_scenario_path(name), checked=not is_generated(name)), name=name)
 
 
-def _read(path: Path, checked: bool = True) -> Scenario:
+def _read_file(path: Path, checked: bool = True) -> Scenario:
     """Read and check a scenario file; `checked` as in `load_part`."""
     document = read_typed(path, ScenarioTable, "scenario file")
     require(
         not UNSHOWN.search(path.stem),
         f"{path}: the file's name, which the scenario gets, holds control characters; rename the file.",
     )
-    scenario, stated = _scenario(document, path, checked)
+    scenario, stated = _build_scenario(document, path, checked)
     check_layouts(scenario, str(path))
-    return with_attach_lines(scenario, stated, str(path))
+    return add_attach_lines(scenario, stated, str(path))
 
 
 def find_scenario_path(given: str | Path) -> Path:
@@ -89,7 +89,7 @@ def find_scenario_path(given: str | Path) -> Path:
     return folder("scenarios") / f"{given}.toml"
 
 
-def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, tuple[Preference, ...]]:
+def _build_scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, tuple[Preference, ...]]:
     """The scenario without insertion axes, and the preferences for them that the file states per operation."""
     parts = read_parts(top.parts, path, checked)
     entries = read_operations(top.operations, path, parts)
@@ -119,10 +119,12 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         nominal_poses=np.array([entry.goal for entry in entries]),
         attach=(),
         grasps=tuple(entry.grasp for entry in entries),
-        site=_site(top.site, f"{path}, site"),
+        site=_read_site(top.site, f"{path}, site"),
         shifts=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Shift)),
         turns=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Turn)),
-        human_error=None if top.human_error is None else _human_error(top.human_error, f"{path}, human_error", entries),
+        human_error=None
+        if top.human_error is None
+        else _read_human_error(top.human_error, f"{path}, human_error", entries),
         thresholds=Thresholds(**judge),
         success_means=success_means,
         clearance_mm=top.clearance_mm,
@@ -133,7 +135,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
     return scenario, tuple(entry.attach for entry in entries)
 
 
-def _site(table: SiteTable, place: str) -> Site:
+def _read_site(table: SiteTable, place: str) -> Site:
     """The site of a `[site]` table, in m and radians."""
     x, y = table.center_mm
     wide, deep = table.spread_mm
@@ -141,7 +143,7 @@ def _site(table: SiteTable, place: str) -> Site:
     return Site((1e-3 * x, 1e-3 * y), (1e-3 * wide, 1e-3 * deep), (float(low), float(high)))
 
 
-def _human_error(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
+def _read_human_error(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
     """The human error of a `[human_error]` table; its direction must be horizontal at the goal."""
     known = 1 <= table.operation <= len(entries)
     require(known, f"{place}, operation: an operation from 1 to {len(entries)} is needed, {table.operation} was given.")

@@ -33,7 +33,7 @@ class PartTable(FileTable, frozen=True, kw_only=True):
     start: Pose | None = None
     color: tuple[_Share, _Share, _Share] | None = None
     fit: dict[str, _Undersize] = msgspec.field(default_factory=dict)
-    """Face that recedes by the clearance -> undersize, [mm], see `with_fit`."""
+    """Face that recedes by the clearance -> undersize, [mm], see `mark_fit_faces`."""
 
 
 class ContactTable(FileTable, frozen=True, kw_only=True):

@@ -29,9 +29,9 @@ from apo_bench.correction.solvers import (
 )
 from apo_bench.geometry import Array, pose
 
-_TRIED = 32
+_SAMPLES = 32
 """Evenly spread points that are measured if the search from the plan fails."""
-_BEGUN = 4
+_STARTS = 4
 """The best of those points, from which the search restarts."""
 _TURNS = 5
 """Largest number of linearisations in one search."""
@@ -52,7 +52,7 @@ Fits = Callable[[Array], bool]
 """Whether the plan with these target poses, (n, 4, 4), fits."""
 
 
-class _Held(NamedTuple):
+class _FixedDirections(NamedTuple):
     """The contacts that hold at given target poses, to project other poses onto them."""
 
     system: Equations
@@ -68,7 +68,7 @@ class _Held(NamedTuple):
     L: Array
     """(n, 6, 6): Cholesky factors of the covariances of the observed poses."""
 
-    def put_back(self, goals: Array) -> Array | None:
+    def project_to_contacts(self, goals: Array) -> Array | None:
         """The nearest poses, (n, 4, 4), at which every contact holds as well as before; None if none were found."""
         nearest = find_nearest_poses(self.compact.among(self.kept & self.exact), goals, self.L)
         off = compute_violations(self.system, self.exact, self.inequalities, nearest.poses)
@@ -84,21 +84,21 @@ class FreeSpace:
     """(n, 4, 4), at s = 0, world frame, [m]."""
     twists: Array
     """(n, 6, f): the body twists of one standard deviation along each free direction, [m, rad]."""
-    held: _Held
+    held: _FixedDirections
 
     def __len__(self) -> int:
         return self.twists.shape[2]
 
-    def tangent(self, s: Array) -> Array:
+    def list_tangent_directions(self, s: Array) -> Array:
         """Poses moved along free directions, (n, 4, 4); contacts hold to first order."""
         return np.asarray(self.poses @ pose.exp(self.twists @ s))
 
     def place(self, s: Array) -> Array | None:
         """`tangent(s)` projected back onto the contacts; None if the projection fails."""
-        return self.held.put_back(self.tangent(s))
+        return self.held.project_to_contacts(self.list_tangent_directions(s))
 
 
-def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
+def find_free_space(observation: Observation, goals: Array) -> FreeSpace | None:
     """The directions that the contacts which hold at target poses, (n, 4, 4), leave free.
 
     Args:
@@ -111,7 +111,7 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    held = _held(observation, goals)
+    held = _find_fixed_directions(observation, goals)
     nearest = find_nearest_poses(held.compact.among(held.kept & held.exact), goals, held.L)
     # B Z: twists of one standard deviation along the null space Z of the whitened equations
     known = compute_freedom(nearest.Jt)
@@ -120,22 +120,22 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
     return FreeSpace(goals, unwhiten_twists(nearest.B, known.free), held)
 
 
-def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
+def find_nearest_fitting_poses(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
     """Target poses, (n, 4, 4), that fit and are as near as could be found; None if none were found.
 
     Args:
         fits: The final check, made only if no measure is in excess.
         excess: Size less limit of each measure.
     """
-    search = _Search(space, fits, excess)
-    s = search.mended(np.zeros(len(space)))
+    search = _FitSearch(space, fits, excess)
+    s = search.correct_by_gradient(np.zeros(len(space)))
     if s is None:
-        s = search.elsewhere()
-    return None if s is None else space.place(search.nearer(s))
+        s = search.search_samples()
+    return None if s is None else space.place(search.approach_start(s))
 
 
-def even_points(dimensions: int) -> Iterator[Array]:
-    """`_TRIED` points, (f,), evenly spread by a normal distribution, the nearest to 0 first (Roberts' sequence)."""
+def list_even_points(dimensions: int) -> Iterator[Array]:
+    """`_SAMPLES` points, (f,), evenly spread by a normal distribution, the nearest to 0 first (Roberts' sequence)."""
     from scipy.stats import norm
 
     # the real root of x^(d+1) = x + 1, by fixed point iteration: Roberts takes its negative powers as steps
@@ -144,23 +144,23 @@ def even_points(dimensions: int) -> Iterator[Array]:
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1.0)
     # multiples of the steps modulo 1, mapped to normal quantiles
-    points = norm.ppf((0.5 + np.arange(1, _TRIED + 1)[:, None] * steps) % 1.0)
+    points = norm.ppf((0.5 + np.arange(1, _SAMPLES + 1)[:, None] * steps) % 1.0)
     yield from points[np.argsort((points * points).sum(axis=1), kind="stable")]
 
 
-class _Search(NamedTuple):
+class _FitSearch(NamedTuple):
     """The search in a free space, by coordinates s, (f,)."""
 
     space: FreeSpace
     fits: Fits
     excess: Excess
 
-    def fits_at(self, s: Array) -> bool:
+    def fits_at_point(self, s: Array) -> bool:
         """Whether the plan fits at s, after projection onto the contacts."""
         goals = self.space.place(s)
         return goals is not None and bool((self.excess(goals) <= 0.0).all()) and self.fits(goals)
 
-    def mended(self, s: Array) -> Array | None:
+    def correct_by_gradient(self, s: Array) -> Array | None:
         """The nearest point found at which nothing fails, from s on; None if linearised repairs lead to none.
 
         Each step solves for the shortest vector that repairs every failure linearised so far.
@@ -171,25 +171,27 @@ class _Search(NamedTuple):
             G, h = self._linearised(s)
             rows = np.concatenate([rows, G])
             least = np.concatenate([least, h])
-            nearest = shortest_above(rows, least) if len(G) else None
+            nearest = find_shortest_above(rows, least) if len(G) else None
             if nearest is None:
                 return None
             s = nearest
-            if self.fits_at(s):
+            if self.fits_at_point(s):
                 return s
         return None
 
-    def elsewhere(self) -> Array | None:
+    def search_samples(self) -> Array | None:
         """A point that fits, searched from the evenly spread points with the least total excess; None if none fits."""
-        points = sorted(even_points(len(self.space)), key=self._much)
-        fitting_points = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
+        points = sorted(list_even_points(len(self.space)), key=self._total_excess)
+        fitting_points = (
+            point if self.fits_at_point(point) else self.correct_by_gradient(point) for point in points[:_STARTS]
+        )
         return next((s for s in fitting_points if s is not None), None)
 
-    def _much(self, s: Array) -> float:
+    def _total_excess(self, s: Array) -> float:
         """Sum of all excesses at s."""
-        return float(np.maximum(self.excess(self.space.tangent(s)), 0.0).sum())
+        return float(np.maximum(self.excess(self.space.list_tangent_directions(s)), 0.0).sum())
 
-    def nearer(self, far: Array) -> Array:
+    def approach_start(self, far: Array) -> Array:
         """A point that fits and is nearer to 0 than `far`, which fits.
 
         Bisection on the line to 0 gives the last point that fits. A new search starts just beyond it, where the plan
@@ -200,22 +202,26 @@ class _Search(NamedTuple):
         # bisection between a point that fits and zero, which does not
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
-            inside, outside = (middle, outside) if self.fits_at(middle * far) else (inside, middle)
+            inside, outside = (middle, outside) if self.fits_at_point(middle * far) else (inside, middle)
         back = inside * far
-        mended = self.mended(outside * far)
-        return back if mended is None or mended @ mended > back @ back else mended
+        correct_by_gradient = self.correct_by_gradient(outside * far)
+        return (
+            back
+            if correct_by_gradient is None or correct_by_gradient @ correct_by_gradient > back @ back
+            else correct_by_gradient
+        )
 
     def _linearised(self, s: Array) -> tuple[Array, Array]:
         """(G, h) so that each measure in excess at s is repaired to first order where G s' >= h."""
         # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
-        now = self.excess(self.space.tangent(s))
+        now = self.excess(self.space.list_tangent_directions(s))
         over = now > 0.0  # only measures in excess are linearised
-        ends = [self.excess(self.space.tangent(s + _STEP * axis))[over] for axis in np.eye(len(s))]
+        ends = [self.excess(self.space.list_tangent_directions(s + _STEP * axis))[over] for axis in np.eye(len(s))]
         G = -(np.array(ends).T - now[over][:, None]) / _STEP
         return G, G @ s + now[over] + _BEYOND
 
 
-def shortest_above(G: Array, h: Array) -> Array | None:
+def find_shortest_above(G: Array, h: Array) -> Array | None:
     """The shortest x with G x >= h, (f,); None if there is none (Lawson and Hanson, LDP)."""
     from scipy.optimize import nnls
 
@@ -226,7 +232,7 @@ def shortest_above(G: Array, h: Array) -> Array | None:
     return None if abs(residual[-1]) < _SHORTEST else np.asarray(-residual[:-1] / residual[-1])
 
 
-def _held(observation: Observation, goals: Array) -> _Held:
+def _find_fixed_directions(observation: Observation, goals: Array) -> _FixedDirections:
     """The contacts that hold at target poses, as equations and inequalities of the `contact` method.
 
     If some contact does not hold that way, all contacts are plain equations instead.
@@ -243,7 +249,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
         off = compute_violations(system, exact, inequalities, goals)
     limits = np.maximum(off, _EXACT_M)
     compact = build_compact_equations(system, len(assembly))
-    return _Held(
+    return _FixedDirections(
         system,
         compact,
         exact,
@@ -251,11 +257,11 @@ def _held(observation: Observation, goals: Array) -> _Held:
         # kept: contacts that do not hold even as plain equations are ignored
         off <= observation.gap_m,
         limits,
-        _factor(observation),
+        _factor_noise(observation),
     )
 
 
-def _factor(observation: Observation) -> Array:
+def _factor_noise(observation: Observation) -> Array:
     """Cholesky factors L of the observation's covariances, with `UNKNOWN` for operations that were not observed."""
     if observation.observed.all():
         return factor_noise(observation)

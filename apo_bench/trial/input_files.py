@@ -21,7 +21,7 @@ import numpy as np
 from apo_bench.io import open_file
 from apo_bench.names import find_own_module
 from apo_bench.perception.observation.noise_file import find_noise_path
-from apo_bench.records.user_code import DATA_PREFIXES, is_own_code
+from apo_bench.records.user_code import DATA_PREFIXES, is_user_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, find_scenario_path
 from apo_bench.scenario.parts import read_part
@@ -29,7 +29,7 @@ from apo_bench.scenario.parts import read_part
 _CHUNK = 1 << 20  # bytes read at once
 
 
-def content_pieces(
+def hash_input_files(
     scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]
 ) -> dict[str, str]:
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
@@ -49,29 +49,29 @@ def content_pieces(
         "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
     }
     return {
-        "scenario": _scenario_digest(scenario, source),
+        "scenario": _digest_scenario(scenario, source),
         **{name: digest_files(paths) for name, paths in files.items()},
-        "thresholds": digest(thresholds),
+        "thresholds": compute_digest(thresholds),
     }
 
 
-def noise_content(*names: str) -> dict[str, str]:
+def hash_noise_files(*names: str) -> dict[str, str]:
     """`noise NAME` -> 16 hexadecimal digits over the file, for noise models that are files or plugins."""
     paths = {f"noise {name}": path for name in names if (path := find_noise_path(name)) is not None}
-    return {name: digest_files([path]) for name, path in paths.items()} | own_content("noise", *names)
+    return {name: digest_files([path]) for name, path in paths.items()} | hash_user_code("noise", *names)
 
 
-def own_content(kind: str, *names: str) -> dict[str, str]:
+def hash_user_code(kind: str, *names: str) -> dict[str, str]:
     """`KIND NAME` -> 16 hexadecimal digits over the files of the module, for plugins `module:name`."""
-    own = [name for name in names if is_own_code(kind, name)]
-    digests = {f"{kind} {name}": _module_digest(name.partition(":")[0]) for name in own}
+    own = [name for name in names if is_user_code(kind, name)]
+    digests = {f"{kind} {name}": _digest_module(name.partition(":")[0]) for name in own}
     return {name: found for name, found in digests.items() if found is not None}
 
 
-def own_files(name: str) -> tuple[Path, ...]:
+def list_user_files(name: str) -> tuple[Path, ...]:
     """The files of a plugin `module:name`; empty for any other name."""
-    is_own = all(is_own_code(column, name) for column in DATA_PREFIXES)
-    return module_files(name.partition(":")[0]) if is_own else ()
+    is_own = all(is_user_code(column, name) for column in DATA_PREFIXES)
+    return list_module_files(name.partition(":")[0]) if is_own else ()
 
 
 def digest_files(paths: Iterable[Path]) -> str:
@@ -87,22 +87,22 @@ def digest_files(paths: Iterable[Path]) -> str:
             while chunk := file.read(_CHUNK):
                 whole.update(chunk)
         found.append(whole.digest())
-    return digest(b"".join(found))
+    return compute_digest(b"".join(found))
 
 
-def digest(content: bytes) -> str:
+def compute_digest(content: bytes) -> str:
     """16 hexadecimal digits of SHA-256."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 @cache
-def _module_digest(module: str) -> str | None:
+def _digest_module(module: str) -> str | None:
     """Digest of the source files of a module at the first call; None if it has none."""
-    files = module_files(module)
+    files = list_module_files(module)
     return digest_files(files) if files else None
 
 
-def module_files(module: str) -> tuple[Path, ...]:
+def list_module_files(module: str) -> tuple[Path, ...]:
     """The source files of a module and of its imports from the same folder, found without running it.
 
     For a module installed in site-packages, only files of its own package count.
@@ -123,17 +123,17 @@ def module_files(module: str) -> tuple[Path, ...]:
     return tuple(sorted(Path(file) for file in found if file and file.endswith(".py")))
 
 
-def _scenario_digest(scenario: Scenario, source: str | Path | Scenario) -> str:
+def _digest_scenario(scenario: Scenario, source: str | Path | Scenario) -> str:
     """Digest of a scenario's file, or of its values if it is given as an object."""
     if isinstance(source, Scenario):
-        return digest(json.dumps(_plain(scenario), sort_keys=True).encode())
+        return compute_digest(json.dumps(_convert_to_plain(scenario), sort_keys=True).encode())
     return digest_files([find_scenario_path(source)])
 
 
-def _plain(value: Any) -> Any:
+def _convert_to_plain(value: Any) -> Any:
     """Nested dataclasses, mappings, sets and arrays as values for `json`; paths, hashed elsewhere, become None."""
     if is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: _convert_to_plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, Path):
@@ -141,7 +141,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (frozenset, set)):
         return sorted(value)
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): _convert_to_plain(v) for k, v in value.items()}
     if isinstance(value, (tuple, list)):
-        return [_plain(v) for v in value]
+        return [_convert_to_plain(v) for v in value]
     return value

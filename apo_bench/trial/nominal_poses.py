@@ -28,13 +28,13 @@ def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
     factors = [np.linalg.inv(np.linalg.cholesky(observation.covariance[k])) for k in observed]
 
     def residuals(place: Array) -> Array:
-        T = _planar(place)
+        T = _make_planar_pose(place)
         twists = [pose.log(pose.inverse(T @ nominal[k]) @ observation.poses[k]) for k in observed]
         return np.concatenate([L @ twist for L, twist in zip(factors, twists, strict=True)])
 
-    start = _first_guess(nominal[observed], observation.poses[observed])
+    start = _guess_planar_pose(nominal[observed], observation.poses[observed])
     # scales of x, y [m] and yaw [rad]
-    return np.asarray(_planar(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
+    return np.asarray(_make_planar_pose(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
 
 
 def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
@@ -47,17 +47,17 @@ def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
     return np.asarray(flat @ nominal)
 
 
-def _first_guess(nominal: Array, observed: Array) -> Array:
+def _guess_planar_pose(nominal: Array, observed: Array) -> Array:
     """(x, y, yaw): the mean turn of the parts, then the mean of the remaining shifts."""
     # the mean yaw maximises the sum of tr(Rz(yaw)^t R_k) over the turns R_k from nominal to observed
     turns = observed[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
     sine = (turns[:, 1, 0] - turns[:, 0, 1]).sum()
     yaw = float(np.arctan2(sine, (turns[:, 0, 0] + turns[:, 1, 1]).sum()))
-    T = _planar(np.array([0.0, 0.0, yaw]))
+    T = _make_planar_pose(np.array([0.0, 0.0, yaw]))
     return np.append((observed[:, :2, 3] - (T @ nominal)[:, :2, 3]).mean(axis=0), yaw)
 
 
-def _planar(place: Array) -> Array:
+def _make_planar_pose(place: Array) -> Array:
     """The pose (4, 4) on the table of (x, y, yaw), [m, rad]."""
     x, y, yaw = place
     return pose.at((x, y, 0.0), (0.0, 0.0, float(np.degrees(yaw))))

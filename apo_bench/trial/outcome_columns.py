@@ -17,11 +17,11 @@ from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.wrong_contacts import find_wrong_relation
 from apo_bench.records import GraspSlip, TrialRecord, replace_infinite
 from apo_bench.trial.planning import MethodResult
-from apo_bench.trial.pose_error import goal_errors, pose_errors
+from apo_bench.trial.pose_error import measure_goal_errors, measure_pose_errors
 from apo_bench.trial.trial_stages import Attempt
 
 
-def confidence_columns(
+def fill_confidence_columns(
     result: MethodResult, observation: Observation, given: Observation, truth: Array | None
 ) -> TrialRecord:
     """Columns on how far the correction can be trusted: its consistency test, and how far it is from the truth.
@@ -35,10 +35,10 @@ def confidence_columns(
     wrong: TrialRecord = {
         "wrong_contact": None if given.assembly is right else find_wrong_relation(right, given.assembly)
     }
-    return wrong | _test(result.correction) | _truth(result, right, given, truth)
+    return wrong | _fill_test_columns(result.correction) | _fill_truth_columns(result, right, given, truth)
 
 
-def _test(correction: Correction | None) -> TrialRecord:
+def _fill_test_columns(correction: Correction | None) -> TrialRecord:
     """Columns of the correction's consistency test, and of contacts and observations that it rejected."""
     if correction is None:
         return {}
@@ -58,13 +58,13 @@ def _test(correction: Correction | None) -> TrialRecord:
     }
 
 
-def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Array | None) -> TrialRecord:
+def _fill_truth_columns(result: MethodResult, right: Assembly, given: Observation, truth: Array | None) -> TrialRecord:
     """Whether the 95 % region of the correction contains the truth, and the plan's pose errors; empty without truth."""
     if truth is None:
         return {}
     correction = result.correction
     plan = result.plan
-    fixed, free = (None, None) if plan is None else goal_errors(right, plan.start, truth, plan.target_poses)
+    fixed, free = (None, None) if plan is None else measure_goal_errors(right, plan.start, truth, plan.target_poses)
     return {
         "inside_95": contains_truth(given, correction, truth) if correction and correction.ok else None,
         "planned_error_fixed_mm": replace_infinite(fixed),
@@ -72,18 +72,18 @@ def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Arr
     }
 
 
-def method_columns(result: MethodResult) -> TrialRecord:
+def fill_method_columns(result: MethodResult) -> TrialRecord:
     """Columns of the method: corrected operations, tried corrections, gaps, extra steps and fit adjustments."""
     columns: TrialRecord = {
         "corrected_operations": [],
         "tried_corrections": [],
-        "gap_before_mm": _mm(result.gap_before_m),
-        "gap_after_mm": _mm(result.gap_after_m),
+        "gap_before_mm": _to_mm(result.gap_before_m),
+        "gap_after_mm": _to_mm(result.gap_after_m),
     }
     if result.correction is not None:
-        columns["corrected_operations"] = _numbers(result.correction.freed)
+        columns["corrected_operations"] = _number_operations(result.correction.freed)
         columns["tried_corrections"] = [
-            {"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)}
+            {"step": int(step) + 1, "free": _number_operations(free), "gap_mm": _to_mm(gap_m)}
             for step, free, gap_m in result.correction.tried
         ]
     if result.plan is not None:
@@ -94,12 +94,12 @@ def method_columns(result: MethodResult) -> TrialRecord:
     return columns
 
 
-def _numbers(operations: Iterable[int]) -> list[int]:
+def _number_operations(operations: Iterable[int]) -> list[int]:
     """Operations counted from 1, as `int`, since JSON cannot hold NumPy integers."""
     return [int(k) + 1 for k in operations]
 
 
-def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRecord:
+def fill_replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRecord:
     """Columns of a replay and its verdict.
 
     Args:
@@ -108,7 +108,9 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
     result = attempt.result
     verdict = attempt.verdict
     conditions = verdict.rests_on
-    fixed, free = (None, None) if truth is None else pose_errors(plan.assembly, plan.start, truth, result.reached)
+    fixed, free = (
+        (None, None) if truth is None else measure_pose_errors(plan.assembly, plan.start, truth, result.reached)
+    )
     return {
         "as_demonstrated": verdict.as_demonstrated,
         "as_demonstrated_code": verdict.demonstrated.code,
@@ -119,16 +121,16 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
         "least_overlap": replace_infinite(conditions.overlap),
         "penetration_mm": replace_infinite(conditions.penetration_mm),
         "placed_part_shift_mm": replace_infinite(conditions.placed_part_shift_mm),
-        "reached": _poses(result.reached.final),
+        "reached": _format_poses(result.reached.final),
         "pose_error_fixed_mm": replace_infinite(fixed),
         "pose_error_free_mm": replace_infinite(free),
         "peak_force_n": replace_infinite(result.peak_force_n),
-        "grasp_slip": list(map(_slip, result.in_hand)),
+        "grasp_slip": list(map(_format_slip, result.in_hand)),
         "sim_time_s": result.sim_time_s,
-    } | _probing(result.probing)
+    } | _fill_probing_columns(result.probing)
 
 
-def _probing(found: ProbingResult | None) -> TrialRecord:
+def _fill_probing_columns(found: ProbingResult | None) -> TrialRecord:
     """Columns of the robot's probing; empty if it did not probe."""
     if found is None:
         return {}
@@ -142,7 +144,7 @@ def _probing(found: ProbingResult | None) -> TrialRecord:
     }
 
 
-def _slip(each: SlipInHand) -> GraspSlip:
+def _format_slip(each: SlipInHand) -> GraspSlip:
     """Slip of a part in the hand, in mm and degrees: until its last motion began (`carried_*`), and until release."""
     return {
         "operation": each.operation + 1,
@@ -153,7 +155,7 @@ def _slip(each: SlipInHand) -> GraspSlip:
     }
 
 
-def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
+def _format_poses(final: Snapshot | None) -> dict[str, list[float]] | None:
     """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame; None if the replay did not end."""
     if final is None:
         return None
@@ -161,6 +163,6 @@ def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
     return {part: [*(p[:3] * 1e3).tolist(), *p[3:].tolist()] for part, p in packed.items()}
 
 
-def _mm(metres: float) -> float | None:
+def _to_mm(metres: float) -> float | None:
     """Metres in millimetres; None if not finite."""
     return replace_infinite(metres * 1e3)

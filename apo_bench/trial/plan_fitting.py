@@ -19,13 +19,13 @@ from apo_bench.planning.prediction.plan_measures import Measure, measure_plan
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.execution import in_reach
 from apo_bench.simulation.scene import Scene, build_scene
-from apo_bench.trial.free_directions import free_space, nearest_fitting
+from apo_bench.trial.free_directions import find_free_space, find_nearest_fitting_poses
 
-ROOMS_MM = (2.0, 0.5)
+MARGINS_MM = (2.0, 0.5)
 """Distances to keep between parts, and of the centre of mass from an edge; the second is tried if the first fails."""
-_SLACK = 0.01
+_LIMIT_SLACK = 0.01
 """Room that a plan with less than the wanted room may still lose [mm]."""
-_ROOMY = ("on_way", "from_above")
+_LARGE_LIMIT = ("on_way", "from_above")
 """Kinds of measures that are distances between parts."""
 _EXACT_M = 1e-9
 """Contacts with a smaller gap count as closed."""
@@ -93,14 +93,14 @@ def fit_plan(correction: Correction, observation: Observation, where: Scene | Sc
         if not predict_failure(plan, where.clearance_mm, where.thresholds, where.attach).fails:
             return FittingPlan(plan)
         where = build_scene(where)
-    why = _fault(where, plan)
-    goals = _goals_that_fit(plan, correction.assumed or observation, where) if why else None
+    why = _predict_fault(where, plan)
+    goals = _find_fitting_poses(plan, correction.assumed or observation, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
-    return FittingPlan(plan.with_target_poses(goals), _moves(plan.target_poses, goals), why)
+    return FittingPlan(plan.with_target_poses(goals), _list_moves(plan.target_poses, goals), why)
 
 
-def _fault(scene: Scene, plan: Plan) -> str | None:
+def _predict_fault(scene: Scene, plan: Plan) -> str | None:
     """The predicted failure of a plan, or that it is out of reach.
 
     Returns:
@@ -112,7 +112,7 @@ def _fault(scene: Scene, plan: Plan) -> str | None:
     return None if in_reach(plan, scene) else "the arm would not reach all of it"
 
 
-def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
+def _measure_plan(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
     """The measures of a plan, as `predict_failure` compares them.
 
     Args:
@@ -121,44 +121,45 @@ def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, 
     return tuple(measure_plan(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, room_mm))
 
 
-def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
+def _find_fitting_poses(plan: Plan, observation: Observation, scene: Scene) -> Array | None:
     """Target poses, (n, 4, 4), near those of the plan, at which it fits; None if none were found.
 
     Args:
         plan: A plan that does not fit.
-        believed: The observation with the contacts and covariances that define the free directions.
+        observation: The observation with the contacts and covariances that define the free directions.
     """
     try:
-        space = free_space(believed, plan.target_poses)
+        space = find_free_space(observation, plan.target_poses)
     except InputError:
         return None
     if space is None:
         return None
-    before = _measured(scene, plan)
-    allowed = _earlier_gaps(plan)
+    before = _measure_plan(scene, plan)
+    allowed = _measure_earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
         """Whether contacts hold as well as before, also those broken later, and nothing is predicted to fail."""
         moved = plan.with_target_poses(goals)
-        held = all(
-            (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
+        fixed_operations = all(
+            (poses <= np.maximum(most, _EXACT_M)).all()
+            for poses, most in zip(_measure_earlier_gaps(moved), allowed, strict=True)
         )
-        return held and _fault(scene, moved) is None  # None: nothing fails
+        return fixed_operations and _predict_fault(scene, moved) is None  # None: nothing fails
 
-    for room_mm in ROOMS_MM:
-        limits = _limits(before, _measured(scene, plan, room_mm), room_mm)
-        fitting_goals = nearest_fitting(space, fits, partial(_excess, plan, scene, room_mm, limits))
+    for room_mm in MARGINS_MM:
+        limits = _list_limits(before, _measure_plan(scene, plan, room_mm), room_mm)
+        fitting_goals = find_nearest_fitting_poses(space, fits, partial(_measure_excess, plan, scene, room_mm, limits))
         if fitting_goals is not None:
             return fitting_goals
     return None
 
 
-def _excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
+def _measure_excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
     """Size less limit of each measure of the plan with target poses `goals`, (k,), [mm]."""
-    return np.array([measure.size for measure in _measured(scene, plan.with_target_poses(goals), room_mm)]) - limits
+    return np.array([measure.size for measure in _measure_plan(scene, plan.with_target_poses(goals), room_mm)]) - limits
 
 
-def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
+def _list_limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
     """The limit of each measure, (k,), [mm].
 
     Distances between parts must be at least `room_mm`. Where the plan has less and does not fail, it must keep what it
@@ -170,14 +171,14 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
     """
     limits = []
     for plain, roomy in zip(before, with_room, strict=True):
-        wanted = -room_mm if plain.kind in _ROOMY else plain.allowed
-        had = (plain.kind == "falls" and not plain.exceeded) or (plain.kind in _ROOMY and plain.size <= 0.0)
+        wanted = -room_mm if plain.kind in _LARGE_LIMIT else plain.allowed
+        had = (plain.kind == "falls" and not plain.exceeded) or (plain.kind in _LARGE_LIMIT and plain.size <= 0.0)
         # Sizes of distances are negative: a larger size is less room.
-        limits.append(max(wanted, roomy.size + _SLACK) if had and roomy.size > wanted else wanted)
+        limits.append(max(wanted, roomy.size + _LIMIT_SLACK) if had and roomy.size > wanted else wanted)
     return np.array(limits)
 
 
-def _earlier_gaps(plan: Plan) -> list[Array]:
+def _measure_earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact, [m], one array for each time before parts are taken apart again."""
     return [
         build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
@@ -186,7 +187,7 @@ def _earlier_gaps(plan: Plan) -> list[Array]:
     ]
 
 
-def _moves(before: Array, after: Array) -> tuple[FreeMove, ...]:
+def _list_moves(before: Array, after: Array) -> tuple[FreeMove, ...]:
     """The moves between target poses `before` and `after`, (n, 4, 4) each, without negligible ones."""
     shifts = 1e3 * np.linalg.norm(after[:, :3, 3] - before[:, :3, 3], axis=1)
     turns = np.degrees(np.linalg.norm(pose.log(pose.inverse(before) @ after)[:, 3:], axis=1))

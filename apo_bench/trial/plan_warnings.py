@@ -9,7 +9,7 @@ from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene import build_scene
 
 
-def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
+def describe_plan_warnings(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
     """The warnings about a plan in one sentence; empty if there are none.
 
     For example: `the stated noise does not explain the correction (p = 0.0004); predicted: operation 3 (stick) will
@@ -28,7 +28,7 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
     return "; ".join(sentences)
 
 
-def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
+def describe_arm_limits(scenario: Scenario, plan: Plan | None, arm: str) -> str:
     """Whether an arm can execute a plan: the predicted failure, or how far the joints stay from their limits.
 
     For example: `panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.

@@ -52,12 +52,12 @@ def apply_method(
     """
     if isinstance(method, str):
         if method == "oracle" and truth is not None:
-            return _uncorrected(observation, truth, None)
+            return _plan_uncorrected(observation, truth, None)
         if method == "nominal" and where is not None and observation.observed.any():
             scenario = where.scenario if isinstance(where, Scene) else where
-            return _uncorrected(observation, fit_nominal_poses(scenario.nominal_poses, observation), None)
+            return _plan_uncorrected(observation, fit_nominal_poses(scenario.nominal_poses, observation), None)
         if method == "uncorrected" or (method == "nominal" and where is not None):
-            return _uncorrected(observation, observation.poses, observation_failure(observation))
+            return _plan_uncorrected(observation, observation.poses, observation_failure(observation))
     correction = correct(observation, resolve_simulated(method), reobserve)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
@@ -70,7 +70,7 @@ def apply_method(
     return MethodResult(fitting.plan, None, correction.gap_before_m, after_m, correction, fitting)
 
 
-def _uncorrected(observation: Observation, poses: Array, failure: Outcome | None) -> MethodResult:
+def _plan_uncorrected(observation: Observation, poses: Array, failure: Outcome | None) -> MethodResult:
     """The result of a method that plans with given poses, (n, 4, 4), or fails."""
     gap_m = measure_largest_gap(observation.assembly, observation.start, poses)
     if failure:

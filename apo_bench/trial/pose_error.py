@@ -10,10 +10,10 @@ _RANK_CUT_OFF = 1e-7
 """Relative cut-off: at consistent poses singular values of free directions are rounding, the others far larger."""
 
 
-def pose_errors(
+def measure_pose_errors(
     assembly: Assembly, start: Poses, truth_goals: Array, reached: ReachedState
 ) -> tuple[float | None, float | None]:
-    """The pose errors of the main parts of a replay, each just after its operation, as in `goal_errors`.
+    """The pose errors of the main parts of a replay, each just after its operation, as in `measure_goal_errors`.
 
     Returns:
         (fixed, free), [mm]; (None, None) if an operation was not finished.
@@ -21,10 +21,10 @@ def pose_errors(
     if any(snapshot is None for snapshot in reached.after):
         return None, None
     at = [s.poses[operation.main] for operation, s in zip(assembly.operations, reached.after, strict=True) if s]
-    return goal_errors(assembly, start, truth_goals, np.array(at).reshape(-1, 4, 4))
+    return measure_goal_errors(assembly, start, truth_goals, np.array(at).reshape(-1, 4, 4))
 
 
-def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Array) -> tuple[float, float]:
+def measure_goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Array) -> tuple[float, float]:
     """Root mean square per operation of the error of target poses, in fixed and in free directions, [mm].
 
     The error of an operation is the body twist from the true pose to the given one. A rotation counts by the motion of
@@ -42,16 +42,16 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     """
     # rotations count as ways of a point at LENGTH_M, so that all coordinates are lengths
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
-    goals = _turned_back(assembly, truth_goals, goals)
+    goals = _undo_symmetric_rotations(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
     _, J = build_contact_equations(assembly, start, truth_goals).linearise(truth_goals)
     # de = (J / unit) (unit dxi): the rows of J / unit span the fixed directions, and B^t B projects onto that span
-    basis = _row_space(J / unit)
+    basis = _find_row_space(J / unit)
     fixed = basis.T @ (basis @ error)
-    return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
+    return _root_mean_square_mm(fixed, len(assembly)), _root_mean_square_mm(error - fixed, len(assembly))
 
 
-def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
+def _undo_symmetric_rotations(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """`goals` with parts of revolution rotated about their axes nearest to the truth, unless they carry others."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
@@ -60,12 +60,12 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     ).reshape(-1, 4, 4)
 
 
-def _rms_mm(error: Array, operations: int) -> float:
+def _root_mean_square_mm(error: Array, operations: int) -> float:
     """Root mean square of an error, (6 n,), [m], per operation, in mm."""
     return float(np.linalg.norm(error) / np.sqrt(operations)) * 1e3
 
 
-def _row_space(J: Array) -> Array:
+def _find_row_space(J: Array) -> Array:
     """An orthonormal basis of the row space, (rank, columns)."""
     if not J.size:
         return np.zeros((0, J.shape[1]))

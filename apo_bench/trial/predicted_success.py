@@ -43,7 +43,7 @@ from apo_bench.trial.contact_errors import (
     rates_of,
     share_within,
 )
-from apo_bench.trial.free_directions import FreeSpace, free_space
+from apo_bench.trial.free_directions import FreeSpace, find_free_space
 
 if TYPE_CHECKING:
     from apo_bench.simulation.scene.scene import Scene
@@ -317,7 +317,7 @@ def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
 def _free_space(explanation: PossibleTruth) -> FreeSpace | None:
     """What the contacts of an explanation leave free; None if that is nothing or unknown."""
     try:
-        return free_space(explanation.believed, explanation.poses)
+        return find_free_space(explanation.believed, explanation.poses)
     except InputError:
         return None
 

@@ -18,7 +18,7 @@ from apo_bench.records import (
     list_setting_columns,
 )
 from apo_bench.scenario import Scenario, load_scenario
-from apo_bench.trial.fingerprint import config_hash
+from apo_bench.trial.fingerprint import compute_config_hash
 
 _OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", RECORD_FIELDS))
 """Columns of a record from `success` on: they state what happened, those before it the settings."""
@@ -30,7 +30,7 @@ def start_record(config: TrialConfig, scenario: Scenario, hashed: str) -> TrialR
     """The settings columns of a record, with its identity and the judge's thresholds.
 
     Args:
-        hashed: From `config_hash`.
+        hashed: From `compute_config_hash`.
     """
     versions = {"schema": RECORD_SCHEMA, "env_id": ENV_ID, "config_hash": hashed}
     settings = list_setting_columns(config, scenario.name)
@@ -61,12 +61,12 @@ def record_lost_trial(config: TrialConfig, content: str, code: str) -> TrialReco
     It has no wall times and compiles no scene, so it does not depend on the machine that lost the trial.
 
     Args:
-        content: From `content_hash`.
+        content: From `compute_content_hash`.
     """
     return _record_failure(config, content, None, Outcome("worker", code, None, describe_outcome(code)))
 
 
-def record_misbehaviour(config: TrialConfig, content: str, demonstration: str, why: str) -> TrialRecord:
+def record_corrector_failure(config: TrialConfig, content: str, demonstration: str, why: str) -> TrialRecord:
     """The failed record of a trial whose corrector raised an error or returned an invalid value.
 
     Args:
@@ -80,5 +80,5 @@ def record_misbehaviour(config: TrialConfig, content: str, demonstration: str, w
 
 def _record_failure(config: TrialConfig, content: str, demonstration: str | None, end: Outcome) -> TrialRecord:
     """A record with settings, the code of the demonstration (None if unknown) and a failure."""
-    record = start_record(config, load_scenario(config.scenario), config_hash(config, content))
+    record = start_record(config, load_scenario(config.scenario), compute_config_hash(config, content))
     return record | {"demonstration": demonstration} | end_record(end, success=False)

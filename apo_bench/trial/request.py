@@ -8,8 +8,8 @@ from typing import Any, final
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.formats.json_forms import write_form
-from apo_bench.formats.observation import read_observation_file, read_stated
-from apo_bench.formats.observation_json import observation_form
+from apo_bench.formats.observation import read_fully_stated_observation, read_observation_file
+from apo_bench.formats.observation_json import make_observation_form
 from apo_bench.io import read_text
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -20,13 +20,13 @@ from apo_bench.records import (
     convert_to_python_units,
     read_secret_seed,
 )
-from apo_bench.scenario import Scenario, find_part_in_the_air, load_scenario
+from apo_bench.scenario import Scenario, find_floating_part, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
-from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash
 from apo_bench.trial.keywords import expand_noise_level
 from apo_bench.trial.record_start_and_end import record_lost_trial
 from apo_bench.trial.rollout import Rollout, trial_story
@@ -194,8 +194,8 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
         renderer(scene.work.model, 16, 12).close()  # fails before the trial if nothing can draw
     simulated = None
     if request.observation is not None:
-        observation = read_stated(request.observation, scene.scenario)
-        aloft = find_part_in_the_air(observation.assembly, observation.start, _MEASURED_AIR_M)
+        observation = read_fully_stated_observation(request.observation, scene.scenario)
+        aloft = find_floating_part(observation.assembly, observation.start, _MEASURED_AIR_M)
         if aloft is not None:
             raise InputError(f"{request.observation}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
         text = read_text(request.observation, "observation file")
@@ -205,8 +205,8 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
         if request.save_observation is not None:
             name = request.scenario
             name = name if name == scene.scenario.name else str(Path(name).resolve())
-            write_form(observation_form(_observe(config, scene, simulated), name), request.save_observation)
-        content = content_hash(scene.scenario, config.scenario, scene.arm.files)
+            write_form(make_observation_form(_observe(config, scene, simulated), name), request.save_observation)
+        content = compute_content_hash(scene.scenario, config.scenario, scene.arm.files)
         record = record_trial(config, scene, simulated, content, watch=watch)
     if track is None or record["sim_time_s"] is None:  # nothing was replayed, so there is nothing to show
         return record
@@ -222,9 +222,9 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
 
 def record_lost_request(request: Request, config: TrialConfig, scenario: Scenario, code: str) -> TrialRecord:
     """The record of a request whose process died (`worker_died`) or took too long (`time_limit`)."""
-    content = content_hash(scenario, config.scenario, find_arm(config.arm).files)
+    content = compute_content_hash(scenario, config.scenario, find_arm(config.arm).files)
     record = record_lost_trial(config, content, code)
     if request.observation is None:
         return record
     text = read_text(request.observation, "observation file")
-    return record | {"config_hash": config_hash(config, content, text), **MEASURED}
+    return record | {"config_hash": compute_config_hash(config, content, text), **MEASURED}

@@ -35,20 +35,20 @@ from apo_bench.records import (
     parse_robot_error,
     uses_contacts,
 )
-from apo_bench.records.run.validation import unwritable
+from apo_bench.records.run.validation import describe_unwritable
 from apo_bench.scenario import Scenario, list_scenario_names
 from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
-from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.detected_contacts import count_contacts, use_detected_contacts
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash
 from apo_bench.trial.keywords import configure_trial
 from apo_bench.trial.nominal_poses import move_nominal_poses
-from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
+from apo_bench.trial.outcome_columns import fill_confidence_columns, fill_method_columns, fill_replay_columns
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import abstain, predict_success
-from apo_bench.trial.record_start_and_end import end_record, record_misbehaviour, start_record
+from apo_bench.trial.record_start_and_end import end_record, record_corrector_failure, start_record
 from apo_bench.trial.trial_stages import (
     CONTACT_SOURCE,
     WRENCH,
@@ -109,7 +109,7 @@ def run_trial(
             poses in the world frame, [m]. Default: that of the configuration.
         noise: A noise model by name or file, or the object itself as in `observe`. Default: that of the configuration.
         simulated: The demonstration of this seed and human error scale. Default: simulated here.
-        content: From `content_hash`. Default: computed here.
+        content: From `compute_content_hash`. Default: computed here.
         watch: Called with the `mujoco.MjData` about every 20 ms of simulated time, such as a `Film`.
         cache: States that replays of the scene share; it changes only the computing time.
         settings: Settings of `TrialConfig` and `noise_level`, with a scenario.
@@ -139,8 +139,8 @@ def run_trial(
         "scene of the same scenario, or leave it out.",
     )
     simulated = simulated or demonstration_of(config, scene)
-    content = content or content_hash(scene.scenario, source, scene.arm.files)
-    record = start_record(config, scene.scenario, config_hash(config, content))
+    content = content or compute_content_hash(scene.scenario, source, scene.arm.files)
+    record = start_record(config, scene.scenario, compute_config_hash(config, content))
     record |= {"demonstration": simulated.demonstration.code}
     if simulated.demonstration.code != "ok":
         return record | end_record(demonstration_failure(simulated.demonstration), success=None)
@@ -176,8 +176,8 @@ def run_measured(
         f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use "
         "uncorrected or paper.",
     )
-    content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    record = start_record(settings, scene.scenario, config_hash(settings, content, text))
+    content = compute_content_hash(scene.scenario, settings.scenario, scene.arm.files)
+    record = start_record(settings, scene.scenario, compute_config_hash(settings, content, text))
     record |= MEASURED | {"demonstration": "ok"}
     context = RunContext(scene, settings, parse_method(settings.method), watch)
     return record | _plan_and_replay(context, observation, _choose_contacts(settings, observation, None), None, None)
@@ -222,7 +222,7 @@ def _plan_and_replay(
                 plan = replace(plan, assembly=observation.assembly)
             record = _replay(context, plan, observation, truth)
         record |= {"failure_prediction": prediction, "predicted_success": predicted_success}
-    record |= method_columns(planned) | confidence_columns(planned, observation, given, truth)
+    record |= fill_method_columns(planned) | fill_confidence_columns(planned, observation, given, truth)
     if planned.correction is not None:
         record |= {"reobservations": reobserve.reobservations if reobserve else 0}
     if uses_contacts(config.method):
@@ -246,7 +246,7 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
     execution = ExecutionConfig(config.fidelity, spiral, robot_error=error, probing=probing)
     attempt = replay_and_judge(plan, scene, reference, context.callbacks, execution, context.cache)
     end = end_record(trial_outcome(attempt), success=attempt.verdict.success)
-    return end | {"joint_control": scene.arm.control} | replay_columns(attempt, plan, truth)
+    return end | {"joint_control": scene.arm.control} | fill_replay_columns(attempt, plan, truth)
 
 
 def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array | None) -> Observation:
@@ -257,7 +257,7 @@ def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array
     if not uses_contacts(config.method):
         return observation
     if config.contact_source in DETECTED:
-        return with_detected_contacts(observation, config.contact_source)
+        return use_detected_contacts(observation, config.contact_source)
     if truth is None:
         return observation
     rng = stream(config.seed, CONTACT_SOURCE, config.secret_seed)
@@ -314,10 +314,10 @@ def record_trial(
     try:
         record = run_trial(config, scene, simulated=simulated, content=content, **more)
         # A colon marks a plugin, whose results are checked.
-        wrong = unwritable(record) if ":" in config.method else ""
+        wrong = describe_unwritable(record) if ":" in config.method else ""
         if not wrong:
             return record
         why = f"the corrector '{config.method}' returned what no record can hold ({wrong})"
     except CorrectorMisbehaved as error:
         why = str(error)
-    return record_misbehaviour(config, content, simulated.demonstration.code, why)
+    return record_corrector_failure(config, content, simulated.demonstration.code, why)

@@ -34,7 +34,7 @@ _BUTTONS = (
 """One dictionary per group of buttons: label -> key of `Cursor.press`."""
 
 
-def no_browser() -> str:
+def explain_missing_browser() -> str:
     """Return why no browser can be used; empty if one can."""
     if find_spec("viser") is None:
         return 'viser is not installed; install it with: pip install "apo_bench[view]"'
@@ -75,7 +75,7 @@ class Page:
         self.cursor = start_at_end(rollout)
         self._requests = deque[str | int]()  # keys to press, or numbers of moments to go to
         self._data = make_initial_state(rollout.scene.work, rollout.segments[0].start)
-        self._server = _server(port)
+        self._server = _start_server(port)
         self._drawn: object = None  # the state that the page shows now
         self._shown: dict[tuple[ShapeKind, int], Any] = {}
         self.address = f"http://{HOST}:{self._server.get_port()}"
@@ -101,7 +101,7 @@ class Page:
         count = Counter[ShapeKind]()
         with self._server.atomic():
             for kind, at in shapes_of(self.cursor.rollout.scene, self._data, snapshot):
-                handle = self._handle(kind, count[kind])
+                handle = self._get_handle(kind, count[kind])
                 count[kind] += 1
                 # viser orders position and quaternion as (x, y, z), (w, x, y, z)
                 if not np.array_equal(at, (*handle.position, *handle.wxyz)):
@@ -115,7 +115,7 @@ class Page:
             self._slider.value = state[0]
         self._drawn = state
 
-    def _handle(self, kind: ShapeKind, number: int) -> Any:
+    def _get_handle(self, kind: ShapeKind, number: int) -> Any:
         """Return the viser object of the shape of this kind with this number; make it when it first appears."""
         if (kind, number) not in self._shown:
             name = f"/{len(self._shown)}"
@@ -161,7 +161,7 @@ class Page:
             group.on_click(lambda event, keys=keys: self._requests.append(keys[event.target.value]))
 
 
-def _server(port: int) -> Any:
+def _start_server(port: int) -> Any:
     """Start the viser server of a page at a port of this machine."""
     import viser
 

@@ -6,7 +6,7 @@ from typing import Literal
 from apo_bench.errors import InputError, require
 from apo_bench.simulation.film.window import no_window, step_in_window
 from apo_bench.trial.rollout import Rollout
-from apo_bench.viz.browser import PORT, no_browser, serve_rollout
+from apo_bench.viz.browser import PORT, explain_missing_browser, serve_rollout
 from apo_bench.viz.rollout_cursor import start_at_end
 
 Display = Literal["window", "browser"]
@@ -24,7 +24,7 @@ def choose_display(port: int | None) -> Display:
     require(port is None or 1 <= port <= 65535, f"--port must be from 1 to 65535, got {port}.")
     if port is None and not no_window():
         return "window"
-    missing = no_browser()
+    missing = explain_missing_browser()
     require(not missing or port is None, f"--port {port} needs a browser, but {missing}.")
     if missing:
         raise InputError(

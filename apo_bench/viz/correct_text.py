@@ -6,10 +6,10 @@ import numpy as np
 
 from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
-from apo_bench.formats.json_forms import covariance_form, pose_form
+from apo_bench.formats.json_forms import make_covariance_form, make_pose_form
 from apo_bench.geometry import pose
-from apo_bench.viz.dof_text import dof_form, hypothesis_forms, hypothesis_lines
-from apo_bench.viz.form_text import fact_lines
+from apo_bench.viz.dof_text import format_hypotheses, make_dof_form, make_hypothesis_forms
+from apo_bench.viz.form_text import list_facts
 
 _SCHEMA = "apo-bench/correction/1"
 _TOO_GOOD = 1e-6  # a p-value above 1 - _TOO_GOOD shows that the stated noise is far too large ...
@@ -24,7 +24,7 @@ POSE_COLUMNS = {
     "moved_mm": ".3f",
     "turned_deg": ".3f",
 }
-"""Columns of the corrected poses: keys of an operation in `correction_form`, with their formats."""
+"""Columns of the corrected poses: keys of an operation in `make_correction_form`, with their formats."""
 SUSPECT_COLUMNS = {
     "relation": "",
     "made": "d",
@@ -34,21 +34,21 @@ SUSPECT_COLUMNS = {
     "p_value": ".2g",
     "may_be_wrong": "",
 }
-"""Columns of the relations that may be wrong: keys of a suspect in `correction_form`, with their formats."""
+"""Columns of the relations that may be wrong: keys of a suspect in `make_correction_form`, with their formats."""
 
 
-def correction_lines(form: dict[str, Any], correction: Correction) -> list[tuple[str, str]]:
-    """Return name and text of each line: the facts of `correction_form`, the two tests, the hypotheses."""
+def format_correction(form: dict[str, Any], correction: Correction) -> list[tuple[str, str]]:
+    """Return name and text of each line: the facts of `make_correction_form`, the two tests, the hypotheses."""
     contradictory = correction.status == "inconsistent"
     more = {
         "test": _describe_test(correction.test, contradictory),
         "test_without": _describe_test(correction.test_after, contradictory),
-        "hypotheses": hypothesis_lines(correction.hypotheses),
+        "hypotheses": format_hypotheses(correction.hypotheses),
     }
-    return fact_lines(form, _TABLES) + fact_lines(more)
+    return list_facts(form, _TABLES) + list_facts(more)
 
 
-def correction_form(
+def make_correction_form(
     scenario: str,
     method: str,
     observation: Observation,
@@ -71,18 +71,18 @@ def correction_form(
         "method": method,
         "status": correction.status,
         "sentence": correction.sentence,
-        "gap_before_mm": _finite(correction.gap_before_m * 1e3),
-        "gap_after_mm": _finite(correction.gap_after_m * 1e3) if correction.ok else None,
+        "gap_before_mm": _replace_infinite(correction.gap_before_m * 1e3),
+        "gap_after_mm": _replace_infinite(correction.gap_after_m * 1e3) if correction.ok else None,
         "rank": correction.rank,
         "freedom": None if explanation is None else explanation.freedom,
         "deviations_assumed": assumed,
-        "operations": _operation_forms(observation, correction) if correction.ok else None,
-        "test": _test_form(correction.test),
-        "test_after": _test_form(correction.test_after),
+        "operations": _list_operation_forms(observation, correction) if correction.ok else None,
+        "test": _make_test_form(correction.test),
+        "test_after": _make_test_form(correction.test_after),
         "dropped": list(correction.dropped),
         "left_out": [k + 1 for k in correction.left_out],
-        "hypotheses": hypothesis_forms(correction.hypotheses),
-        "explanation": None if explanation is None else dof_form(scenario, explanation),
+        "hypotheses": make_hypothesis_forms(correction.hypotheses),
+        "explanation": None if explanation is None else make_dof_form(scenario, explanation),
     }
 
 
@@ -102,7 +102,7 @@ def _describe_test(test: Consistency | None, contradictory: bool) -> str | None:
     return f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {test.p_value:.2g}: {verdict}"
 
 
-def _operation_forms(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
+def _list_operation_forms(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
     """Return the corrected pose of each operation, with its distance from the observed pose and its covariance."""
     # D = observed^-1 corrected; the last three numbers of its log are a rotation vector, whose norm is the angle
     D = pose.inverse(observation.poses) @ correction.poses
@@ -112,19 +112,21 @@ def _operation_forms(observation: Observation, correction: Correction) -> list[d
         {
             "operation": k + 1,
             "part": operation.main,
-            **pose_form(correction.poses[k]),
+            **make_pose_form(correction.poses[k]),
             "moved_mm": float(moved_mm[k]),
             "turned_deg": float(turned_deg[k]),
-            "covariance_mm_deg": None if correction.covariance is None else covariance_form(correction.covariance[k]),
+            "covariance_mm_deg": None
+            if correction.covariance is None
+            else make_covariance_form(correction.covariance[k]),
         }
         for k, operation in enumerate(observation.assembly.operations)
     ]
 
 
-def _test_form(test: Consistency | None) -> dict[str, Any] | None:
+def _make_test_form(test: Consistency | None) -> dict[str, Any] | None:
     """Return a consistency test as a JSON object; None without a test."""
     return test and {
-        "chi_square": _finite(test.chi_square),
+        "chi_square": _replace_infinite(test.chi_square),
         "freedom": test.freedom,
         "p_value": test.p_value,
         "level": test.level,
@@ -134,7 +136,7 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
             | {
                 "made": suspect.made + 1,
                 "contacts": list(map(str, suspect.contacts)),
-                "chi_square": _finite(suspect.chi_square),
+                "chi_square": _replace_infinite(suspect.chi_square),
                 "may_be_wrong": suspect in test.ambiguous,
             }
             for suspect in test.suspects
@@ -143,6 +145,6 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
     }
 
 
-def _finite(x: float) -> float | None:
+def _replace_infinite(x: float) -> float | None:
     """Return a finite number, or None, since JSON has no infinity."""
     return float(x) if np.isfinite(x) else None

@@ -34,7 +34,7 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     for axes, title in zip(grid[0], _TITLES, strict=True):
         axes.set_title(title, fontsize=11)
     for row, event in zip(grid, run.events, strict=False):
-        row[0].set_ylabel(_describe(event), fontsize=9)
+        row[0].set_ylabel(_describe_event(event), fontsize=9)
         _draw_row(row, run, event, view)
     # every picture is cropped to the pixels that changed in any event, with a margin
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in run.events]
@@ -45,7 +45,7 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     save_figure(figure, out, dpi=72)
 
 
-def _describe(event: DetectedOperation) -> str:
+def _describe_event(event: DetectedOperation) -> str:
     """Return the label of an event: `3: cube, 97 % explained`."""
     moved = ", ".join(sorted(event.moved)) or "nothing"
     if event.operation is None:

@@ -32,7 +32,7 @@ DEPTH_COLUMNS = {
     "deviation_deg": ".2f",
     "explained": ".0%",
 }
-"""Columns of the operations of `depth_form`, with their formats."""
+"""Columns of the operations of `make_depth_form`, with their formats."""
 
 
 class DepthRun(NamedTuple):
@@ -76,7 +76,7 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
     return DepthRun(scene.scenario.name, simulated, simulated.images, images, events, models)
 
 
-def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
+def make_depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
     """Return a run as a JSON object: operations from 1, errors of the depth camera without those of the human."""
     operations = []
     # unexpected events have operation None and are not looked up
@@ -84,7 +84,7 @@ def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: flo
     for k, operation in enumerate(run.simulated.demonstration.assembly.operations):
         event = events.get(k)
         form = {"operation": k + 1, "moves": list(operation.moves), "found": False}
-        operations.append(form if event is None or event.found is None else form | _estimate_form(event, run, k))
+        operations.append(form if event is None or event.found is None else form | _make_estimate_form(event, run, k))
     return {
         "schema": _SCHEMA,
         "scenario": run.scenario,
@@ -96,7 +96,7 @@ def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: flo
     }
 
 
-def _estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
+def _make_estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
     """Return the estimated pose of operation k, (x, y, z [mm], qw, qx, qy, qz), its deviations and its true error."""
     found = event.found
     deviation = np.sqrt(np.diag(found.covariance))

@@ -20,10 +20,10 @@ CONTACT_COLUMNS = {
     "overlap": ".0%",
     "in_scenario": "",
 }
-"""Columns of the contacts of `detection_form`, with their formats."""
+"""Columns of the contacts of `make_detection_form`, with their formats."""
 
 
-def detection_form(
+def make_detection_form(
     scenario: str, contact_source: str, observation: Observation, detected: DetectedContacts, assumed: bool
 ) -> dict[str, Any]:
     """Return detected contacts as a JSON object: mm and degrees, operations from 1.
@@ -49,7 +49,7 @@ def detection_form(
         "deviation_assumed": assumed,
         "unobserved": [k + 1 for k, seen in enumerate(observation.observed) if not seen],
         "contacts": [
-            _contact_form(each.made, each.contact)
+            _make_contact_form(each.made, each.contact)
             | {
                 "observed_gap_mm": _to_mm(each.seen_gap_m),
                 "gap_mm": _to_mm(each.gap_m),
@@ -61,7 +61,7 @@ def detection_form(
             }
             for each in detected.evidence
         ],
-        "missed": [_contact_form(*missed) for missed in sorted(right - found, key=str)],
+        "missed": [_make_contact_form(*missed) for missed in sorted(right - found, key=str)],
         **count_contacts(observation.assembly, detected.assembly),
         "probability": detected.probability,
         "next": rival
@@ -74,7 +74,7 @@ def _name_contacts(assembly: Assembly) -> set[str]:
     return {f"{relation.made + 1}: {relation.contact}" for relation in assembly.relations()}
 
 
-def _contact_form(operation: int, contact: Contact) -> dict[str, Any]:
+def _make_contact_form(operation: int, contact: Contact) -> dict[str, Any]:
     return {"operation": operation + 1} | {key: str(face) for key, face in contact._asdict().items()}
 
 

@@ -54,8 +54,8 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
         if part.part in own:
             solid = scenario.assembly.solids[part.part]
             color = scenario.colors.get(part.part, _GRAY)
-            marks += [_mark(solid, part.pose, color, free.direction, toward) for free in own[part.part].free]
-            lines.append(PanelLine(_describe(explanation, own[part.part]), color))
+            marks += [_make_mark(solid, part.pose, color, free.direction, toward) for free in own[part.part].free]
+            lines.append(PanelLine(_describe_part(explanation, own[part.part]), color))
     scene = build_scene(scenario)
     image = draw_picture(scene, poses, *_SIZE, camera, Marks(marks))
     title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.poses)}"
@@ -69,7 +69,7 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
     save_figure(figure, out)
 
 
-def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Array) -> Any:
+def _make_mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Array) -> Any:
     """Return the mark of a free direction: arrows outside the part for a shift, a ring for a turn.
 
     Args:
@@ -106,7 +106,7 @@ def _write_name(axes: Any, mark: Any, tips: Array) -> None:
     axes.text(x, y, mark.name, ha="center", va="center", **look)
 
 
-def _describe(explanation: Explanation, o: OperationExplanation) -> str:
+def _describe_part(explanation: Explanation, o: OperationExplanation) -> str:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; z fixed`."""
     groups = []
     for along, words in group_by(

@@ -8,15 +8,15 @@ import numpy as np
 from apo_bench.assembly import Hypothesis, spell
 from apo_bench.correction.explanation import Explanation, FreeDirection
 from apo_bench.correction.relation_equations import RelationHold
-from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
+from apo_bench.formats.json_forms import TO_MM_DEG, make_covariance_form, make_pose_form
 from apo_bench.geometry import Array
 from apo_bench.io import group_by
 
 _SCHEMA = "apo-bench/explanation/1"
 DOF_COLUMNS = {"operation": "d", "part": "", "fixed": "", "free": "", "relations": "", "agreeing": ""}
-"""Columns of `dof_rows`, with their formats."""
+"""Columns of `list_dof_rows`, with their formats."""
 PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
-"""Columns of the uncertainty of each part at the end: keys of a part in `dof_form`, with their formats."""
+"""Columns of the uncertainty of each part at the end: keys of a part in `make_dof_form`, with their formats."""
 
 
 def count_directions(explanation: Explanation) -> str:
@@ -26,7 +26,7 @@ def count_directions(explanation: Explanation) -> str:
     return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
-def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
+def list_dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
     """Return one table row per operation with its fixed and free directions, for columns `DOF_COLUMNS`."""
     rows = []
     for o in explanation.operations:
@@ -51,7 +51,7 @@ def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
     return rows
 
 
-def shared_lines(explanation: Explanation) -> list[str]:
+def format_shared_errors(explanation: Explanation) -> list[str]:
     """Return a line for each shared error: `camera: off by (-0.30 ± 0.50, ...) mm and (..) deg`."""
     lines = []
     for estimate in explanation.shared:
@@ -61,7 +61,7 @@ def shared_lines(explanation: Explanation) -> list[str]:
     return lines
 
 
-def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
+def format_hypotheses(hypotheses: Sequence[Hypothesis]) -> list[str]:
     """Return a line for each hypothesis, `0.92: without the observation of operation 2`; none if there is only one."""
     lines = [f"{each.weight:.2g}: {each.sentence or 'as observed'}" for each in hypotheses]
     return lines if len(lines) > 1 else []
@@ -69,10 +69,10 @@ def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
 
 def format_deviation(free: FreeDirection) -> str:
     """Return the standard deviation along a free direction: `1.00 mm` or `0.58 deg`."""
-    return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
+    return f"{_get_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
 
 
-def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
+def make_dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
     """Return an explanation as a JSON object: mm, degrees, operations from 1; an infinite spectral gap is null."""
     return {
         "schema": _SCHEMA,
@@ -83,10 +83,10 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
                 "part": o.part,
                 "rank": o.rank,
                 "fixed": list(o.fixed),
-                "free": [_free_form(free, explanation.poses[o.operation]) for free in o.free],
-                "through": list(map(_hold_form, o.through)),
-                "agreeing": list(map(_hold_form, o.agreeing)),
-                "covariance_mm_deg": covariance_form(o.covariance),
+                "free": [_make_direction_form(free, explanation.poses[o.operation]) for free in o.free],
+                "through": list(map(_make_hold_form, o.through)),
+                "agreeing": list(map(_make_hold_form, o.agreeing)),
+                "covariance_mm_deg": make_covariance_form(o.covariance),
             }
             for o in explanation.operations
         ],
@@ -95,13 +95,13 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
                 "part": part.part,
                 "placed": part.placed + 1,
                 "odl": spell(part.odl),
-                **pose_form(part.pose),
+                **make_pose_form(part.pose),
                 "rank": part.rank,
                 "fixed": list(part.fixed),
-                "free": [_free_form(free, part.pose) for free in part.free],
+                "free": [_make_direction_form(free, part.pose) for free in part.free],
                 "deviation_mm": (part.deviations * TO_MM_DEG)[:3].tolist(),
                 "deviation_deg": (part.deviations * TO_MM_DEG)[3:].tolist(),
-                "covariance_mm_deg": covariance_form(part.covariance),
+                "covariance_mm_deg": make_covariance_form(part.covariance),
             }
             for part in explanation.parts
         ],
@@ -113,7 +113,7 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
                 "name": estimate.error.name,
                 "operations": [k + 1 for k in estimate.error.operations],
                 "twist_mm_deg": (estimate.twist * TO_MM_DEG).tolist(),
-                "covariance_mm_deg": covariance_form(estimate.covariance),
+                "covariance_mm_deg": make_covariance_form(estimate.covariance),
             }
             for estimate in explanation.shared
         ],
@@ -122,7 +122,7 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
     }
 
 
-def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
+def make_hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
     """Return hypotheses as JSON objects: operations from 1, poses and covariances in mm and degrees."""
     return [
         {
@@ -130,20 +130,20 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
             "sentence": each.sentence,
             "left_out": [k + 1 for k in each.left_out],
             "dropped": list(each.dropped),
-            "operations": list(map(pose_form, each.poses)),
-            "covariances_mm_deg": None if each.covariance is None else list(map(covariance_form, each.covariance)),
+            "operations": list(map(make_pose_form, each.poses)),
+            "covariances_mm_deg": None if each.covariance is None else list(map(make_covariance_form, each.covariance)),
         }
         for each in hypotheses
     ]
 
 
-def _deviation(free: FreeDirection) -> float:
+def _get_deviation(free: FreeDirection) -> float:
     """Return the standard deviation along a free direction, in mm or degrees."""
     # the first three entries of TO_MM_DEG convert to mm, the last three to degrees
     return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
 
 
-def _free_form(free: FreeDirection, T: Array) -> dict[str, Any]:
+def _make_direction_form(free: FreeDirection, T: Array) -> dict[str, Any]:
     """Return a free direction as a JSON object.
 
     Args:
@@ -159,12 +159,12 @@ def _free_form(free: FreeDirection, T: Array) -> dict[str, Any]:
         "axis": d.axis.tolist(),
         "axis_world": (T[:3, :3] @ d.axis).tolist(),
         **({"point_mm": (d.point * 1e3).tolist()} if d.turns else {}),
-        "deviation_deg" if d.turns else "deviation_mm": _deviation(free),
+        "deviation_deg" if d.turns else "deviation_mm": _get_deviation(free),
         "with": [k + 1 for k in free.along],
     }
 
 
-def _hold_form(hold: RelationHold) -> dict[str, Any]:
+def _make_hold_form(hold: RelationHold) -> dict[str, Any]:
     """Return a relation that holds a part, as a JSON object; `lost` is null if the relation holds until the end."""
     return {
         "relation": hold.relation,

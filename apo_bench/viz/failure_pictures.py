@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.io import read_lines
 from apo_bench.records import TrialConfig, TrialRecord, get_record_key, restore_settings
 from apo_bench.records.run.replay_command import Files
-from apo_bench.records.run.validation import record_of
+from apo_bench.records.run.validation import decode_record
 
 _SIZE = (640, 480)  # width and height, in pixels
 _QUALITY = 82  # of the JPEG file
@@ -26,9 +26,7 @@ _TIP_M = 0.012  # from the contact to the head of the arrow
 _ARROW = (0.85, 0.1, 0.1)  # colour of the arrow
 
 
-def failure_pictures(
-    chosen: Sequence[TrialRecord], folder: Path, files: Files
-) -> tuple[list[FailurePicture], list[str]]:
+def draw_failures(chosen: Sequence[TrialRecord], folder: Path, files: Files) -> tuple[list[FailurePicture], list[str]]:
     """Draw failed trials.
 
     Args:
@@ -63,28 +61,28 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePic
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
     # the picture shows no arm, and the arm of the record may be a plugin that must not be run here
     scene = scene_of(replace(restore_settings(record, files.get(name, name)), arm=TrialConfig.arm))
-    poses = _read_poses(_whole_record(folder, record).get("reached"))
+    poses = _read_poses(_read_whole_record(folder, record).get("reached"))
     require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
-    contact = _failed_contact(record, scene)
-    image = draw_picture(scene, poses, *_SIZE, _camera(scene, record, poses), _mark(contact, scene, poses))
+    contact = _find_failed_contact(record, scene)
+    image = draw_picture(scene, poses, *_SIZE, _aim_camera(scene, record, poses), _make_arrow(contact, scene, poses))
     words = "where the parts ended" if contact is None else f"where the parts ended; the arrow points at {contact}"
     return FailurePicture(record, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), words)
 
 
-def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
+def _read_whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
     """Return the complete line of `trials.jsonl` for a record that a report has shortened; empty if not found."""
     # a cheap search in the text of each line, before any line is parsed
     wanted = (f'"seed": {record["seed"]},'.encode(), json.dumps(record["config_hash"]).encode())
     path = folder / "trials.jsonl"
     for number, line in read_lines(path, "table of trials"):
         if all(part in line for part in wanted):
-            whole = record_of(line, f"{path}, line {number}")
+            whole = decode_record(line, f"{path}, line {number}")
             if get_record_key(whole) == get_record_key(record):
                 return whole
     return {}
 
 
-def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
+def _find_failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
     """Return the contact that the failure sentence names, else the first contact of an operation with a force stop."""
     operations = scene.scenario.assembly.operations
     sentence = f"{record.get('sentence') or ''} "
@@ -96,7 +94,7 @@ def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:
     return next(iter(named), None)
 
 
-def _mark(contact: Contact | None, scene: Any, poses: Poses) -> Any:
+def _make_arrow(contact: Contact | None, scene: Any, poses: Poses) -> Any:
     """Return an arrow that points down at the middle of the environment's face, or None.
 
     If the environment is a fixed part, the arrow points at the face of the manipulated part. The middle of a fixed
@@ -117,7 +115,7 @@ def _read_poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
     return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in (reached or {}).items()}
 
 
-def _camera(scene: Any, record: TrialRecord, poses: Poses) -> Any:
+def _aim_camera(scene: Any, record: TrialRecord, poses: Poses) -> Any:
     """Aim the camera at the parts of the operation that failed, else at all parts that are not fixed."""
     from apo_bench.simulation.film.framing import frame_parts
     from apo_bench.simulation.scene.render import aim_camera

@@ -9,7 +9,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import align_columns
 from apo_bench.perception.observation.fitting.fit import PERCENTILES, GoodnessOfFit, count_outliers_by_score
 from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, TruncatedTails
-from apo_bench.viz.form_text import fact_lines
+from apo_bench.viz.form_text import list_facts
 
 _SCHEMA = "apo-bench/noise-fit/2"
 _RARE = 0.01  # a turned part whose shift has a smaller tail probability than this is counted as off as well
@@ -17,7 +17,7 @@ _NOTED = ("parts", "images", "distance_mm", "found", "left_over", "turned", "tur
 """Keys of a form that the notes of a noise file state."""
 
 
-def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[GoodnessOfFit]) -> dict[str, Any]:
+def make_fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[GoodnessOfFit]) -> dict[str, Any]:
     """Return counts and fits as a JSON object: mm and degrees; degrees of freedom are null for a Gaussian."""
     inlier = residuals.is_inlier
     turned = inlier & ~residuals.is_upright  # inliers with a rotation error beyond TURNED_DEG
@@ -44,10 +44,10 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Go
         "bias_standard_error_mm": (shift.std(axis=0) / np.sqrt(len(shift))).tolist(),
         "along_over_across": float(np.median(residuals.along_mm[inlier])) / across,
         "percentiles": list(PERCENTILES),
-        "inlier_across_mm": _percentiles(residuals.across_mm[inlier]),
-        "inlier_along_mm": _percentiles(residuals.along_mm[inlier]),
-        "inlier_turn_deg": _percentiles(residuals.angle_deg[inlier]),
-        "inlier_turn_by_trace_deg": _percentiles(residuals.trace_deg[inlier]),
+        "inlier_across_mm": _list_percentiles(residuals.across_mm[inlier]),
+        "inlier_along_mm": _list_percentiles(residuals.along_mm[inlier]),
+        "inlier_turn_deg": _list_percentiles(residuals.angle_deg[inlier]),
+        "inlier_turn_by_trace_deg": _list_percentiles(residuals.trace_deg[inlier]),
         "fit": {
             f.name: {
                 "unit": f.unit,
@@ -58,33 +58,33 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Go
             }
             for f in figures
         },
-        "shift_mm": _split_form(measured.shift_mm),
-        "turn_deg": _split_form(measured.turn_deg),
+        "shift_mm": _make_split_form(measured.shift_mm),
+        "turn_deg": _make_split_form(measured.turn_deg),
     }
 
 
-def fit_lines(form: Mapping[str, Any]) -> list[str]:
-    """Format a form of `fit_form` as lines: facts, a table of percentiles, and the goodness of fit."""
+def format_fit(form: Mapping[str, Any]) -> list[str]:
+    """Format a form of `make_fit_form` as lines: facts, a table of percentiles, and the goodness of fit."""
     inliers = [key for key in form if key.startswith("inlier_")]
-    facts = fact_lines(form, ("schema", "percentiles", "fit", *inliers))
+    facts = list_facts(form, ("schema", "percentiles", "fit", *inliers))
     table = [("", "", *(f"p{p}" for p in form["percentiles"]))]
     for name, of in form["fit"].items():
         for head, word in ((f"{name} [{of['unit']}]", "observed"), ("", "fitted")):
             table.append((head, word, *(f"{value:.2f}" for value in of[word])))
-    return [*align_columns(facts), "", *align_columns(table), "", *_goodness_lines(form)]
+    return [*align_columns(facts), "", *align_columns(table), "", *_format_goodness_of_fit(form)]
 
 
-def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
+def list_fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the notes that a noise file states about its fit, one line each."""
     return (
         "Level 1 is as measured: mm and degrees, Student t, none beyond the limit.",
         f"Inliers that are turned by more than {TURNED_DEG:g} deg are not fitted: symmetries are not known.",
-        *map(": ".join, fact_lines({key: form[key] if form[key] != [] else "none" for key in _NOTED})),
-        *_goodness_lines(form),
+        *map(": ".join, list_facts({key: form[key] if form[key] != [] else "none" for key in _NOTED})),
+        *_format_goodness_of_fit(form),
     )
 
 
-def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
+def _format_goodness_of_fit(form: Mapping[str, Any]) -> list[str]:
     """Return a line per fit: its Kolmogorov-Smirnov distance, and the 95 % quantile of that for a correct fit."""
     return [
         f"{name}: Kolmogorov-Smirnov {of['kolmogorov_smirnov']:.3f}, by chance below "
@@ -93,11 +93,11 @@ def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _percentiles(values: Array) -> list[float]:
+def _list_percentiles(values: Array) -> list[float]:
     return list(map(float, np.percentile(values, PERCENTILES)))
 
 
-def _split_form(split: TruncatedTails) -> dict[str, Any]:
+def _make_split_form(split: TruncatedTails) -> dict[str, Any]:
     """Return the fitted distributions across and along the ray as a JSON object."""
     return {"limit": split.limit} | {
         name: {"scale": t.scale, "degrees_of_freedom": t.freedom if np.isfinite(t.freedom) else None}

@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Table
 
 
-def fact_lines(form: Mapping[str, Any], without: Iterable[str] = ()) -> list[tuple[str, str]]:
+def list_facts(form: Mapping[str, Any], without: Iterable[str] = ()) -> list[tuple[str, str]]:
     """Return name and text of every value that is neither null nor an empty list, except the keys `without`."""
     known = {key: value for key, value in form.items() if key not in without and value is not None and value != []}
     return [(key.replace("_", " "), format_value(value)) for key, value in known.items()]
@@ -15,13 +15,13 @@ def fact_lines(form: Mapping[str, Any], without: Iterable[str] = ()) -> list[tup
 def format_value(value: Any) -> str:
     """Format a value: floats with four significant digits, lists with commas, objects with their keys."""
     if isinstance(value, Mapping):
-        return ", ".join(map(" ".join, fact_lines(value)))
+        return ", ".join(map(" ".join, list_facts(value)))
     if isinstance(value, list | tuple):
         return ("; " if value and isinstance(value[0], Mapping) else ", ").join(map(format_value, value)) or "none"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def form_table(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) -> Table:
+def make_table(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) -> Table:
     """Return a `rich` table with one line per object; the columns are titled by keys.
 
     Args:

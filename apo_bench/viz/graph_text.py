@@ -8,7 +8,7 @@ from apo_bench.io import align_columns
 _SCHEMA = "apo-bench/graph/1"
 
 
-def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str]:
+def format_graph(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str]:
     """Return the lines of a graph: nodes with their ODL, then arcs with operations, faces and residuals.
 
     Args:
@@ -25,18 +25,18 @@ def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str
     return [*align_columns(nodes), "", *align_columns(arcs)]
 
 
-def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str, Any]:
+def make_graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str, Any]:
     """Return a graph as a JSON object: operations from 1, residuals in mm (null where unknown)."""
     return {
         "schema": _SCHEMA,
         "scenario": scenario,
         "step": graph.step,
-        "nodes": [_node_form(node) | {"stands": graph.is_current(node)} for node in graph.nodes],
+        "nodes": [_make_node_form(node) | {"stands": graph.is_current(node)} for node in graph.nodes],
         "arcs": [
             {
                 "name": arc.name,
-                "manipulated": _node_form(arc.manipulated),
-                "environment": _node_form(arc.environment),
+                "manipulated": _make_node_form(arc.manipulated),
+                "environment": _make_node_form(arc.environment),
                 "made": arc.made + 1,
                 "lost": None if arc.lost is None else arc.lost + 1,
                 "faces": [[contact.manipulated.face, contact.environment.face] for contact in arc.contacts],
@@ -47,20 +47,20 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str
     }
 
 
-def mermaid_text(graph: Graph) -> str:
+def format_mermaid(graph: Graph) -> str:
     """Return a Mermaid flow chart, which GitHub renders; contacts that disappeared are dotted."""
     number = {node: i for i, node in enumerate(graph.nodes)}
     lines = ["flowchart TD"]
-    lines += [f'  n{i}["{node.part}<br>{_odl(node)}"]' for node, i in number.items()]
+    lines += [f'  n{i}["{node.part}<br>{_make_odl_form(node)}"]' for node, i in number.items()]
     for arc in graph.arcs:
         arrow = "-->" if arc.lost is None else "-.->"
         lines.append(f"  n{number[arc.manipulated]} {arrow}|{arc.name}| n{number[arc.environment]}")
     return "\n".join(lines) + "\n"
 
 
-def _node_form(node: Node) -> dict[str, Any]:
-    return {"part": node.part, "placed": None if node.placed is None else node.placed + 1, "odl": _odl(node)}
+def _make_node_form(node: Node) -> dict[str, Any]:
+    return {"part": node.part, "placed": None if node.placed is None else node.placed + 1, "odl": _make_odl_form(node)}
 
 
-def _odl(node: Node) -> str:
+def _make_odl_form(node: Node) -> str:
     return "T0" if node.placed is None else spell(node.odl)

@@ -54,7 +54,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
         model: Name or object of a noise model.
     """
     noise = make_noise(model, noise_level)
-    demonstration = nominal_demonstration()
+    demonstration = make_nominal_demonstration()
     camera = Camera()
     rng = np.random.default_rng(0)
     errors = []
@@ -75,7 +75,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
     return ErrorSample(four, np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale, missed)
 
 
-def nominal_demonstration() -> Demonstration:
+def make_nominal_demonstration() -> Demonstration:
     """Return the demonstration of an ideal human: the nominal poses of example 5.1 at the centre of their area."""
     scenario = load_scenario(SCENARIO)
     poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.nominal_poses
@@ -83,7 +83,7 @@ def nominal_demonstration() -> Demonstration:
     return Demonstration(scenario.assembly, scenario.start, poses, final, np.zeros((len(poses), 6, 6)))
 
 
-def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample) -> str:
+def write_noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample) -> str:
     """Return the sheet of a model in Markdown, with a table of the drawn errors."""
     facts = describe_model(model)
     if not len(sample.errors):

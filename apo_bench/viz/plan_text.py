@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Plan, compute_placements, spell
-from apo_bench.formats.json_forms import pose_form
+from apo_bench.formats.json_forms import make_pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.io import align_columns, format_direction
 from apo_bench.planning.insertion.arrival import Arrival, compute_screw_state
@@ -54,14 +54,14 @@ class PlanLine(NamedTuple):
         return (*self.leaves.departs, *self.comes.macros)
 
     @property
-    def trouble(self) -> str:
+    def obstacle(self) -> str:
         """A sentence on why no straight insertion leads to the place; empty if one does."""
         if self.comes.chain.locked:
             return "locked: no straight motion leads there"
         return "" if self.comes.free else "no free insertion axis"
 
 
-def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
+def list_plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     """Return the steps of a plan, with macros computed at the nominal poses of the scenario."""
     everything = list_nominal_operations(scenario)
     odls = plan.assembly.odls()
@@ -77,10 +77,10 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     return tuple(lines)
 
 
-def plan_text(lines: Sequence[PlanLine]) -> list[str]:
+def format_plan(lines: Sequence[PlanLine]) -> list[str]:
     """Return an aligned table, followed by a sentence for each operation without a free insertion axis."""
-    wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
-    return [*align_columns([_HEADS, *map(_cells, lines)]), *([""] if wrong else []), *wrong]
+    wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.obstacle}" for line in lines if line.obstacle]
+    return [*align_columns([_HEADS, *map(_list_cells, lines)]), *([""] if wrong else []), *wrong]
 
 
 def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
@@ -96,17 +96,17 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
         stage = stages[line.operation if line.undo else line.operation + 1]  # where the parts stand after the step
         screw = compute_screw_state(scenario.assembly, line.comes, stage)
         position, guarded, across = (axes.tolist() for axes in line.comes.axes)
-        target = {"position_mm": None, "quaternion_wxyz": None} if line.target is None else pose_form(line.target)
-        departs = [_macro_form(line.leaves, macro) for macro in line.leaves.departs]
+        target = {"position_mm": None, "quaternion_wxyz": None} if line.target is None else make_pose_form(line.target)
+        departs = [_make_macro_form(line.leaves, macro) for macro in line.leaves.departs]
         forms.append(
             {
                 "operation": line.operation + 1,
                 "undo": line.undo,
                 "part": line.what.main,
                 "carries": list(line.what.carries),
-                "before": _state_form(line.leaves),
-                "after": _state_form(line.comes) | {"screw": list(screw.all), "rotation": list(screw.rotation)},
-                "macros": departs + [_macro_form(line.comes, macro) for macro in line.comes.macros],
+                "before": _make_state_form(line.leaves),
+                "after": _make_state_form(line.comes) | {"screw": list(screw.all), "rotation": list(screw.rotation)},
+                "macros": departs + [_make_macro_form(line.comes, macro) for macro in line.comes.macros],
                 "from": line.came_from,
                 "until": {"relations": list(line.relations), "back_to": line.back_to or None} | target,
                 "guarded": guarded,
@@ -117,7 +117,7 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
                     "travel_mm": round(1e3 * line.comes.line.travel_m, 6),
                     "free": line.comes.free,
                 },
-                "trouble": line.trouble or None,
+                "trouble": line.obstacle or None,
                 "grasp": {"at_mm": (1e3 * line.grasp.point).tolist(), "across": line.grasp.across.tolist()},
             }
         )
@@ -127,7 +127,7 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
 """Format a step as the cells of `_HEADS`."""
 
 
-def _cells(line: PlanLine) -> tuple[str, ...]:
+def _list_cells(line: PlanLine) -> tuple[str, ...]:
     """Return the cells of a step, in the order of `_HEADS`."""
     # main part, and the parts that it carries
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
@@ -145,7 +145,7 @@ def _cells(line: PlanLine) -> tuple[str, ...]:
         str(line.operation + 1),
         f"undo: {name}" if line.undo else name,
         f"{line.leaves.state.letter} -> {line.comes.state.letter}",
-        ", ".join(macros) or ("-" if line.trouble else "put down"),
+        ", ".join(macros) or ("-" if line.obstacle else "put down"),
         line.came_from,
         " ".join(map(format_direction, guarded)) or "-",
         _list_axes(position),
@@ -160,11 +160,11 @@ def _list_axes(vectors: Iterable[Array]) -> str:
     return " ".join(format_direction(v).lstrip("+-") for v in vectors) or "-"
 
 
-def _state_form(arrival: Arrival) -> dict[str, Any]:
+def _make_state_form(arrival: Arrival) -> dict[str, Any]:
     return {"letter": arrival.state.letter, "translation": list(arrival.state)}
 
 
-def _macro_form(arrival: Arrival, macro: Macro) -> dict[str, Any]:
+def _make_macro_form(arrival: Arrival, macro: Macro) -> dict[str, Any]:
     """Return a macro as a JSON object, with its direction also in the frame of the part."""
     return {
         "name": macro.name,

@@ -42,7 +42,7 @@ class PosesPanel(NamedTuple):
     """Result of the consistency test and the failure prediction; empty if there is none."""
 
 
-def poses_panel(title: str, observation: Observation, poses: Array, step: int, warning: str = "") -> PosesPanel:
+def make_poses_panel(title: str, observation: Observation, poses: Array, step: int, warning: str = "") -> PosesPanel:
     """Place the parts and measure their contacts.
 
     Args:
@@ -64,7 +64,7 @@ def poses_panel(title: str, observation: Observation, poses: Array, step: int, w
     return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)
 
 
-def poses_lines(panels: Sequence[PosesPanel]) -> list[str]:
+def format_poses(panels: Sequence[PosesPanel]) -> list[str]:
     """Return a sentence for each panel: `observed: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
     lines = []
     for panel in panels:
@@ -89,11 +89,11 @@ def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out:
     first = panels[0].poses[assembly.operations[0].main]
     azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
     camera = aim_camera(*frame_parts(assembly, [panels[0].poses], near), azimuth, _ELEVATION_DEG)
-    drawn = [Panel(draw_picture(scene, p.poses, *_SIZE, camera), _lines_below(p), p.title) for p in panels]
+    drawn = [Panel(draw_picture(scene, p.poses, *_SIZE, camera), _list_lines_below(p), p.title) for p in panels]
     save_figure(draw_panels(f"{scenario.name} after operation {step}", drawn), out)
 
 
-def _lines_below(panel: PosesPanel) -> list[PanelLine]:
+def _list_lines_below(panel: PosesPanel) -> list[PanelLine]:
     """Return the lines below a picture: at most `_MOST_LINES` open contacts, then the warning."""
     lines = [f"all contacts hold: largest gap {1e3 * panel.gap_m:.3f} mm"]
     if panel.open:

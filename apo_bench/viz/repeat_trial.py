@@ -6,12 +6,12 @@ from pathlib import Path
 from apo_bench.errors import InputError
 from apo_bench.io import read_lines
 from apo_bench.records import TrialRecord, read_secret_seed, restore_settings
-from apo_bench.records.run.run_file import read_run, scenario_files
-from apo_bench.records.run.validation import record_of
-from apo_bench.records.user_code import own_code
+from apo_bench.records.run.run_file import list_scenario_files, read_run
+from apo_bench.records.run.validation import decode_record
+from apo_bench.records.user_code import list_user_code
 from apo_bench.scenario.scenario_file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash
 from apo_bench.trial.request import Request, run_settings
 from apo_bench.trial.rollout import Rollout
 
@@ -32,18 +32,18 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
         RuntimeError: The trial would differ from the recorded one, or the robot did not replay anything.
     """
     number, record = _choose_trial(folder, number)
-    if code := own_code(record):
+    if code := list_user_code(record):
         raise RuntimeError(
             f"trial {number} names code that does not come with the package ({', '.join(code)}), and no file makes it "
             "run; run the trial yourself with `apo-bench run .. --view`."
         )
     name = record["scenario"]
-    config = restore_settings(record, scenario_files(read_run(folder)).get(name, name))
+    config = restore_settings(record, list_scenario_files(read_run(folder)).get(name, name))
     if secret_seed_file is not None:
         config = replace(config, secret_seed=read_secret_seed(secret_seed_file))
     # the hash shows whether the same files and version are used
-    content = content_hash(load_scenario(config.scenario), config.scenario, find_arm(config.arm).files)
-    if config_hash(config, content) != record.get("config_hash"):
+    content = compute_content_hash(load_scenario(config.scenario), config.scenario, find_arm(config.arm).files)
+    if compute_config_hash(config, content) != record.get("config_hash"):
         secret = record.get("secret_seed") is not None and config.secret_seed is None
         reason = (
             "its secret seed is missing (--secret-seed-file)" if secret else "another version or other files made it"
@@ -63,7 +63,7 @@ def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
     count = 0
     for count, line in read_lines(path, "table of trials"):
         if number in (None, count):
-            record = record_of(line, f"{path}, line {count}")
+            record = decode_record(line, f"{path}, line {count}")
             # sim_time_s is None if nothing was replayed
             if number is not None or (record["success"] is False and record["sim_time_s"] is not None):
                 return count, record

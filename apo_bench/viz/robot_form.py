@@ -24,13 +24,13 @@ _ABOVE_M = 0.1  # height of the approach above the grasp, and length of the retr
 _ALONG = 0.999  # directions whose cosine is larger count as equal
 
 
-def robot_form(
+def make_robot_form(
     lines: Sequence[PlanLine], plan: Plan, scenario: Scenario, frames: RobotFrames, notes: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Return a plan as a JSON object with an entry for each step, undone steps included; mm and unit vectors.
 
     Args:
-        lines: The steps of the plan, of `plan_lines`.
+        lines: The steps of the plan, of `list_plan_lines`.
         notes: Assumptions of the plan and objections to it, one sentence each.
     """
     assembly = plan.assembly
@@ -44,7 +44,7 @@ def robot_form(
             history.append(poses)
             one = type(assembly)(assembly.solids, (assembly.operations[line.operation],), assembly.fixed)
             after = compute_placements(one, poses, line.target[None])[0]
-        steps.append(_step(line, poses[line.what.main], after[line.what.main], plan, frames))
+        steps.append(_make_step_form(line, poses[line.what.main], after[line.what.main], plan, frames))
         poses = after
     to_base = pose.inverse(frames.T_world_base)
     return {
@@ -68,14 +68,14 @@ def robot_form(
     }
 
 
-def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFrames) -> dict[str, Any]:
+def _make_step_form(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFrames) -> dict[str, Any]:
     """Return a step that moves its main part.
 
     Args:
         here, goal: Pose of the part before and after, (4, 4), world, [m].
     """
     part = line.what.main
-    grip = tip_in_part(line.grasp, here)
+    grip = compute_tip_in_part(line.grasp, here)
     # extent of the part's bounding box along the closing direction: an upper bound of the width between the fingers
     width = float(np.abs(line.grasp.across) @ np.ptp(plan.assembly.solids[part].bounds, axis=0))
     tip = here @ grip
@@ -92,17 +92,20 @@ def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFra
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
         "pick": {
-            "above": tip_form(_shift(tip, UP if line.grasp.ahead is None else -tip[:3, 2], _ABOVE_M), frames),
-            "at": tip_form(tip, frames),
+            "above": make_tip_form(_translate(tip, UP if line.grasp.ahead is None else -tip[:3, 2], _ABOVE_M), frames),
+            "at": make_tip_form(tip, frames),
         },
-        "motions": [*_departs(line, here, grip, frames), *_arrives(line, goal, grip, frames)],
-        "leave": tip_form(_shift(end, end[:3, 2], -_ABOVE_M), frames),
+        "motions": [
+            *_list_departure_motions(line, here, grip, frames),
+            *_list_arrival_motions(line, goal, grip, frames),
+        ],
+        "leave": make_tip_form(_translate(end, end[:3, 2], -_ABOVE_M), frames),
         "part_at_goal": format_robot_pose(pose.inverse(frames.T_world_base) @ goal, frames),
-        "trouble": line.trouble or None,
+        "trouble": line.obstacle or None,
     }
 
 
-def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
+def compute_tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
     """Return the pose of the tip in the frame of the part, (4, 4), [m].
 
     The tip looks along `grasp.ahead`, or else straight down at a part of pose `T_world_part`.
@@ -116,7 +119,7 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
     return T
 
 
-def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
+def _list_departure_motions(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """Return the motions by which the part leaves its contacts, in order, each from the end of the one before.
 
     Args:
@@ -128,12 +131,12 @@ def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> l
     for macro in line.leaves.departs:
         begin = end
         way = here[:3, :3] @ line.leaves.to_part_frame(macro.direction)
-        end = _shift(begin, way, macro.length_m or _GUARDED_FROM_M)
-        motions.append(_motion(macro.name, False, begin, end, way, grip, frames))
+        end = _translate(begin, way, macro.length_m or _GUARDED_FROM_M)
+        motions.append(_make_motion_form(macro.name, False, begin, end, way, grip, frames))
     return motions
 
 
-def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
+def _list_arrival_motions(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """Return the motions by which the part arrives, in order, the last of which ends at the goal.
 
     Args:
@@ -143,7 +146,11 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     axis = goal[:3, :3] @ line.comes.line.direction
     macros = list(line.comes.macros)
     if not macros:
-        return [_motion("put down", False, _shift(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames)]
+        return [
+            _make_motion_form(
+                "put down", False, _translate(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames
+            )
+        ]
     motions = []
     begin = goal
     ways = [goal[:3, :3] @ line.comes.to_part_frame(macro.direction) for macro in macros]
@@ -152,20 +159,20 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     # from the goal backwards, since only the last pose is known
     for i, (macro, way) in reversed(list(enumerate(zip(macros, ways, strict=True)))):
         end = begin
-        begin = _shift(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
-        motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
+        begin = _translate(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
+        motions.append(_make_motion_form(macro.name, macro.guarded, begin, end, way, grip, frames))
     return motions[::-1]
 
 
-def _motion(
+def _make_motion_form(
     name: str, guarded: bool, begin: Array, end: Array, way: Array, grip: Array, frames: RobotFrames
 ) -> dict[str, Any]:
     """Return a straight motion of the part from `begin` to `end`, (4, 4), world, in direction `way`, (3,), world."""
     direction = pose.inverse(frames.T_world_base)[:3, :3] @ way
     return {
         "macro": name,
-        "from": tip_form(begin @ grip, frames),
-        "to": tip_form(end @ grip, frames),
+        "from": make_tip_form(begin @ grip, frames),
+        "to": make_tip_form(end @ grip, frames),
         "direction": (np.round(direction, 12) + 0.0).tolist(),
         "length_mm": round(1e3 * float(np.linalg.norm(end[:3, 3] - begin[:3, 3])), 6),
         "guarded": guarded,
@@ -173,7 +180,7 @@ def _motion(
     }
 
 
-def tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
+def make_tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
     """Return a pose of the tip, or of the flange that carries it, in the frame of the base.
 
     Args:
@@ -190,6 +197,6 @@ def format_robot_pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
     return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}
 
 
-def _shift(T: Array, way: Array, far: float) -> Array:
+def _translate(T: Array, way: Array, far: float) -> Array:
     """Translate a pose by `far` [m] along a unit vector of the world."""
     return pose.at(far * way) @ T

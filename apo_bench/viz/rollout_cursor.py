@@ -54,7 +54,7 @@ class Cursor:
 
     def snapshot(self) -> FilmSnapshot:
         """Return everything that is shown at this moment."""
-        return FilmSnapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
+        return FilmSnapshot(self.segment, self.moment, self.words(), self._list_faces(), self._list_overlays())
 
     def press(self, key: str) -> None:
         """Execute a key, one of `WINDOW_KEYS`."""
@@ -68,9 +68,9 @@ class Cursor:
         elif key == "goals":
             self.shows_goals = not self.shows_goals
         elif what == "operation":
-            self._jump([(id(segment), moment.phase.operation) for segment, moment in self.places], way)
+            self._jump_to_group([(id(segment), moment.phase.operation) for segment, moment in self.places], way)
         elif what == "segment":
-            self._jump([id(segment) for segment, _ in self.places], way)
+            self._jump_to_group([id(segment) for segment, _ in self.places], way)
         else:
             self.go(self.place + (1 if way == "next" else -1))
 
@@ -95,14 +95,14 @@ class Cursor:
         if ending and self.segment.world is self.rollout.scene.work:  # only the replay measures a force
             words.append(f"force {moment.phase.force_n:.1f} N")
         if k is not None:
-            words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
+            words += [*map(str, self._assembly.operations[k].contacts), *self._describe_offsets(k)]
         if self.shows_goals:
             words += [f"{_COLORS[name][0]}: {name}" for name in self.rollout.poses]
         if ending and self._is_last:
             words.append(ending)
         return tuple(words)
 
-    def _offsets(self, k: int) -> list[str]:
+    def _describe_offsets(self, k: int) -> list[str]:
         """Return the distances of target poses and of the part from the true pose of operation k, in its frame."""
         if AS_TRUE not in self.rollout.poses:
             return []
@@ -116,7 +116,7 @@ class Cursor:
             lines.append(f"{name}: {mm:.2f} mm, {np.degrees(np.linalg.norm(twist[3:])):.2f} degrees off")
         return lines
 
-    def _jump(self, groups: Sequence[Hashable], way: str) -> None:
+    def _jump_to_group(self, groups: Sequence[Hashable], way: str) -> None:
         """Go to the start of the next group, or to the last start before this moment.
 
         Args:
@@ -129,7 +129,7 @@ class Cursor:
         else:
             self.go(max((i for i in begins if i < self.place), default=0))
 
-    def _faces(self) -> tuple[PartFace, ...]:
+    def _list_faces(self) -> tuple[PartFace, ...]:
         """Return the faces to name: all, or those of the contacts of the current operation, or none."""
         k = self.moment.phase.operation
         if self.faces == "all":
@@ -138,7 +138,7 @@ class Cursor:
         contacts = () if self.faces == "none" or k is None else self._assembly.operations[k].contacts
         return tuple(dict.fromkeys(of for contact in contacts for of in contact))
 
-    def _overlays(self) -> tuple[Overlay, ...]:
+    def _list_overlays(self) -> tuple[Overlay, ...]:
         """Return the parts that have moved up to now, at the poses where each set of target poses places them."""
         k = self.moment.phase.operation
         if k is None or not self.shows_goals:

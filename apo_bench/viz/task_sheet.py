@@ -10,11 +10,11 @@ from apo_bench.geometry import Array
 from apo_bench.io import join_words
 from apo_bench.judging.finished_assembly import list_fixtures
 from apo_bench.records import Thresholds
-from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
+from apo_bench.scenario import NEGLIGIBLE_M, Scenario, Turn, spread_error
 from apo_bench.viz.form_text import format_value
 
 
-def task_sheet(scenario: Scenario, level: int = 1) -> str:
+def write_task_sheet(scenario: Scenario, level: int = 1) -> str:
     """Return the task sheet of a scenario in Markdown.
 
     Args:
@@ -59,7 +59,7 @@ def _describe_human_error(scenario: Scenario) -> str:
     # parts placed on a displaced face are displaced as well
     offsets = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), error.axis).offsets
     mains = [operation.main for operation in scenario.assembly.operations]
-    astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)  # numbers of operations from 0
+    astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NEGLIGIBLE_M)  # numbers of operations from 0
     followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
     follow = f"; {join_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
     return (
@@ -80,7 +80,7 @@ def _describe_variations(scenario: Scenario) -> Iterator[str]:
         yield f"{names[shift.operation]} by {span} mm along {_name_axis(shift.axis)}"
     for turn in scenario.turns:
         degrees = f"{np.degrees(turn.low_rad):g} to {np.degrees(turn.high_rad):g} degrees"
-        yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_through(turn)}"
+        yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_format_axis_point(turn)}"
 
 
 def _describe_verdict(scenario: Scenario) -> dict[str, str]:
@@ -112,7 +112,7 @@ def _format_span(low_m: float, high_m: float) -> str:
     return f"{low_m * 1e3:g} to {high_m * 1e3:g}"
 
 
-def _through(turn: Turn) -> str:
+def _format_axis_point(turn: Turn) -> str:
     """Return the point of a turn, ` through (-30, 0, 0) mm`; empty if it is the origin of the part."""
     return f" through ({', '.join(f'{1e3 * x:g}' for x in turn.point)}) mm" if turn.point.any() else ""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from apo_bench.records import SETTINGS, TrialRecord, probes
-from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.replay_command import format_replay_command
 
 Line = tuple[str, str]
 """Name and text of a line."""
@@ -36,7 +36,7 @@ _OTHERWISE: Mapping[str, Line] = MappingProxyType(
 """Column -> name and template of the number for all other outcomes; the first column with a value is printed."""
 
 
-def summary_lines(record: TrialRecord, scenario: str, observation: Path | None = None) -> list[Line]:
+def format_summary(record: TrialRecord, scenario: str, observation: Path | None = None) -> list[Line]:
     """Return the six lines: settings, correction, result, decisive number, predicted success, command to view.
 
     Args:
@@ -48,15 +48,15 @@ def summary_lines(record: TrialRecord, scenario: str, observation: Path | None =
     known = [f"{gap:.3f} mm {when}" for gap, when in zip(gaps, ("observed", "planned"), strict=True) if gap is not None]
     correction = ", contact gap ".join((record["method"], *known[:1])) + "".join(f", {gap}" for gap in known[1:])
     if observation is None:
-        again = replay_command(record, {record["scenario"]: scenario})
+        again = format_replay_command(record, {record["scenario"]: scenario})
     else:
-        command = replay_command(record, {record["scenario"]: scenario}, measured=True)
+        command = format_replay_command(record, {record["scenario"]: scenario}, measured=True)
         again = f"{command} --observation {shlex.quote(str(observation))}"
     return [
         ("trial", f"{record['scenario']}, {', '.join(_describe_settings(record))}"),
         ("correction", correction),
         ("result", _describe_result(record)),
-        _decisive_line(record),
+        _find_decisive_number(record),
         ("predicted success", "unknown, since there is no plan" if predicted is None else f"{predicted:.2f}"),
         ("look at it", f"{again} --view"),
     ]
@@ -91,7 +91,7 @@ def _describe_result(record: TrialRecord) -> str:
     return f"failure at stage {record['failure_stage']}: {record['failure_code']}{where} ({record.get('sentence')})"
 
 
-def _decisive_line(record: TrialRecord) -> Line:
+def _find_decisive_number(record: TrialRecord) -> Line:
     """Return the number that explains the failure code, else the first number of `_OTHERWISE` that is known."""
     try:
         name, text = _DECISIVE[record["failure_code"] or ""]

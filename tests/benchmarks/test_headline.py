@@ -12,7 +12,7 @@ import pytest
 
 from apo_bench import SweepConfig
 from apo_bench.benchmark.analysis import tally
-from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.grid import list_work_units, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
@@ -47,7 +47,7 @@ def grid_of(described: dict[str, Any]) -> SweepConfig:
 
 def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
     grids = [grid_of(described) for described in run_file()["grids"]]
-    asked = [trial for unit in units(grids, load_all(grids)) for trial in unit]
+    asked = [trial for unit in list_work_units(grids, load_all(grids)) for trial in unit]
     expected = [(t.scenario, t.seed, t.method, t.noise_mm, t.human_error_scale, t.noise, t.robot_error) for t in asked]
     assert sorted(map(key, kept_rows())) == sorted(expected)
     assert run_file()["rows"] == len(expected)
@@ -55,7 +55,7 @@ def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
 
 def test_the_sweep_of_the_headline_is_small_and_has_the_limits() -> None:
     grids = read_sweep(GRID, {"trials": 1})
-    trials = [trial for unit in units(grids, load_all(grids)) for trial in unit]
+    trials = [trial for unit in list_work_units(grids, load_all(grids)) for trial in unit]
     assert SEEDS * len(trials) <= MOST_TRIALS
     by_method = {
         method: {t.noise_mm for t in trials if t.method == method and t.human_error_scale == 0} for method in METHODS

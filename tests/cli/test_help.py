@@ -11,11 +11,11 @@ import typer
 
 from apo_bench.cli.app import app, main
 from apo_bench.cli.shared import GROUPS, OPTIONS
-from apo_bench.cli.shared.completion import offered_names
+from apo_bench.cli.shared.completion import list_offered_names
 from apo_bench.cli.shared.help import OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
-from apo_bench.records.contact_sources import checked_contact_source
-from apo_bench.records.methods import checked_method
+from apo_bench.records.contact_sources import check_contact_source
+from apo_bench.records.methods import check_method
 from apo_bench.scenario.scenario_file import list_scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
@@ -68,10 +68,10 @@ def test_every_option_stands_under_one_heading_and_whole(command: str, capsys: p
 
 
 def test_offered_names_are_the_known_names() -> None:
-    assert tuple(offered_names("scenario")) == list_scenario_names()
-    assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
-    assert [checked_method(name) for name in offered_names("method")] == offered_names("method")
-    assert [checked_contact_source(name) for name in offered_names("contact_source") if name != "face-offset"]
-    assert set(NOISES) < set(offered_names("noise"))
-    for name in offered_names("noise"):
+    assert tuple(list_offered_names("scenario")) == list_scenario_names()
+    assert {name for name in list_offered_names("arm") if not name.endswith(":")} == set(arm_names())
+    assert [check_method(name) for name in list_offered_names("method")] == list_offered_names("method")
+    assert [check_contact_source(name) for name in list_offered_names("contact_source") if name != "face-offset"]
+    assert set(NOISES) < set(list_offered_names("noise"))
+    for name in list_offered_names("noise"):
         assert make_noise(name, NoiseLevel(1.0, 1.0))

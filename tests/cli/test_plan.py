@@ -16,7 +16,7 @@ from apo_bench.io import format_direction
 from apo_bench.planning.insertion.operation_macros import describe_operation_macros
 from apo_bench.scenario.layout import find_nominal_start
 from apo_bench.scenario.scenario_file import list_scenario_names
-from apo_bench.viz.plan_text import describe_plan, plan_lines
+from apo_bench.viz.plan_text import describe_plan, list_plan_lines
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]
@@ -121,7 +121,7 @@ def test_the_table_covers_every_scenario() -> None:
 @pytest.mark.parametrize("name", TABLE)
 def test_states_and_macros_of_every_operation(name: str) -> None:
     scenario = load_scenario(name)
-    form = describe_plan(plan_lines(nominal(scenario), scenario), scenario)
+    form = describe_plan(list_plan_lines(nominal(scenario), scenario), scenario)
     found = [
         (
             f"{step['before']['letter']} -> {step['after']['letter']}",
@@ -201,7 +201,7 @@ def test_undoing_reverses_the_macros() -> None:
     goals = scenario.nominal_poses
     schedule = (*(Step(k) for k in range(5)), Step(4, True), Step(3, True))
     plan = Plan(scenario.assembly, scenario.start, goals, schedule)
-    *_, stick, cube = plan_lines(plan, scenario)
+    *_, stick, cube = list_plan_lines(plan, scenario)
     assert [m.name for m in stick.macros] == ["depart"]
     assert format_direction(stick.macros[0].direction) == "+z"
     assert [(m.name, format_direction(m.direction)) for m in cube.macros] == [

@@ -22,7 +22,7 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import outcomes
-from apo_bench.simulation.execution import execution as replays
+from apo_bench.simulation.execution import execution as record_replays
 from apo_bench.trial.trial_stages import SimulatedDemonstration, reobservations_of, simulate_demonstration
 
 SEED = 5
@@ -232,7 +232,7 @@ def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.Monk
     watched.reset(seed=SEED)
     again = (Step(0), Step(0, undo=True)) * 600
     watched.aim(watched.observation.poses, (*again, *(Step(k) for k in range(3))))
-    monkeypatch.setattr(replays, "plan_moves", _nothing)
+    monkeypatch.setattr(record_replays, "plan_moves", _nothing)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()

@@ -44,7 +44,7 @@ def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
     assert_array_equal(read.t_mm, [[10, 20, 900], [-1.5, 200, 1000]])
     assert_array_equal(read.R[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     assert_array_equal(read.score, [0.5, 1e-3])
-    assert read.spot(1) == f"{path}, line 4"
+    assert read.location(1) == f"{path}, line 4"
 
 
 def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:
@@ -129,7 +129,7 @@ def test_estimates_of_scenes_without_truth_are_no_false_detections(tmp_path: Pat
     whole = read_truth(tmp_path / "val", seen)
     assert match_residuals(seen, whole).surplus == 0
     assert whole.where.tolist() == where.tolist()
-    assert whole.spot(31).endswith("val, 000002, image 6, entry 2")
+    assert whole.location(31).endswith("val, 000002, image 6, entry 2")
     assert read_truth(tmp_path / "val", seen, 3).where[:, 0].tolist() == [3] * 30
     with pytest.raises(InputError, match=r"holds no scene_gt\.json in a folder that is numbered 7, such as 000001"):
         read_truth(tmp_path / "val", seen, 7)

@@ -12,7 +12,7 @@ from apo_bench import InputError, load_scenario
 from apo_bench.formats.csv_form import read_table
 from apo_bench.formats.json_forms import write_form
 from apo_bench.formats.observation import read_observation_file
-from apo_bench.formats.observation_json import observation_form
+from apo_bench.formats.observation_json import make_observation_form
 from apo_bench.geometry import pose
 
 SCENARIO = load_scenario("stick_in_tower")
@@ -64,7 +64,7 @@ def test_deviations_are_read_where_they_are_stated(tmp_path: Path) -> None:
 def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
     seen = read_observation_file(written(tmp_path, *ROWS), "stick_in_tower").observation
     path = tmp_path / "seen.json"
-    write_form(observation_form(seen, "stick_in_tower"), path)
+    write_form(make_observation_form(seen, "stick_in_tower"), path)
     again = apo_bench.read_observation(path, SCENARIO)
     assert again.poses == pytest.approx(seen.poses, abs=1e-15)
     assert again.covariance == pytest.approx(seen.covariance, rel=1e-12, abs=1e-20)

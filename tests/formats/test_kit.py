@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError, load_scenario
 from apo_bench.formats.kit import FORM_COLUMNS, TAG_EDGE_MM, make_part_mesh, make_plate_mesh, write_kit
 from apo_bench.geometry import Solid
-from apo_bench.importers.cad.part_import import raw_solids
+from apo_bench.importers.cad.part_import import read_raw_solids
 from apo_bench.io import read_csv
 
 CLEARANCE_MM = 0.3
@@ -35,7 +35,7 @@ def test_what_is_printed_imports_again_with_the_same_faces(tmp_path: Path, suffi
     for part in ("castle1", "stick"):
         solid = scenario.assembly.solids[part]
         file = tmp_path / f"{scenario.part_files[part].stem}.{suffix}"
-        _, (raw,) = raw_solids(file, "mm" if suffix == "stl" else None)
+        _, (raw,) = read_raw_solids(file, "mm" if suffix == "stl" else None)
         found = [(*region.direction, region.direction @ region.point) for region in raw.regions]
         assert sorted(tuple(np.round(row, 3) + 0.0) for row in found) == planes(solid, CLEARANCE_MM)
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from apo_bench import InputError, Observation, Plan, load_scenario
 from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, correlate_first_order
-from apo_bench.formats.observation_json import observation_form, read_json_observation
-from apo_bench.formats.plan_json import plan_form
+from apo_bench.formats.observation_json import make_observation_form, read_json_observation
+from apo_bench.formats.plan_json import make_plan_form
 from apo_bench.geometry import pose
 
 SCENARIO = load_scenario("stick_in_tower")
@@ -41,7 +41,7 @@ def observation(seed: int = 0) -> Observation:
 
 
 def form() -> dict[str, Any]:
-    return observation_form(with_shared(observation()), "stick_in_tower")
+    return make_observation_form(with_shared(observation()), "stick_in_tower")
 
 
 def with_shared(seen: Observation) -> Observation:
@@ -63,7 +63,7 @@ def read(tmp_path: Path, document: Any) -> Observation:
 
 def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None:
     stated = replace(observation(), outliers=OutlierModel(0.24, 0.05, 8.0, 0.002))
-    assert read(tmp_path, observation_form(stated, "stick_in_tower")).outliers == stated.outliers
+    assert read(tmp_path, make_observation_form(stated, "stick_in_tower")).outliers == stated.outliers
     assert read(tmp_path, form()).outliers is None
     some = read(tmp_path, form() | {"outliers": {"gross_rate": 0.3}})
     assert some.outliers == OutlierModel(0.3)
@@ -77,7 +77,7 @@ def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None
 @given(seed=st.integers(0, 2**32))
 def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
     seen = observation(seed)
-    back = read(tmp_path, observation_form(seen, "stick_in_tower"))
+    back = read(tmp_path, make_observation_form(seen, "stick_in_tower"))
     np.testing.assert_allclose(back.poses, seen.poses, rtol=0, atol=1e-13)
     np.testing.assert_allclose(back.covariance, seen.covariance, rtol=1e-12, atol=0)
     assert back.observed.tolist() == seen.observed.tolist()
@@ -92,7 +92,7 @@ def test_a_plan_states_the_poses_of_steps_that_are_not_target_poses() -> None:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
     seen = observation().poses
     plan = Plan(SCENARIO.assembly, SCENARIO.start, seen[[0, 2, 2]], schedule, seen[[0, 1, 1, 2, 2]])
-    form = plan_form(plan, "stick_in_tower")
+    form = make_plan_form(plan, "stick_in_tower")
     assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
     assert [entry["undo"] for entry in form["schedule"]] == [False, False, True, False, False]
     assert form["operations"][0]["position_mm"] == pytest.approx((1e3 * seen[0, :3, 3]).tolist())
@@ -103,7 +103,7 @@ def test_files_speak_mm_degrees_and_count_from_one() -> None:
     goals[2, :3, 3] = [0.1, -0.2, 0.3]
     covariance = np.tile(np.diag([1e-6] * 3 + [np.radians(2.0) ** 2] * 3), (N, 1, 1))
     seen = Observation(SCENARIO.assembly, SCENARIO.start, goals, covariance, np.ones(N, dtype=bool))
-    entry = observation_form(seen, "stick_in_tower")["operations"][2]
+    entry = make_observation_form(seen, "stick_in_tower")["operations"][2]
     assert (entry["operation"], entry["part"]) == (3, "stick")
     assert entry["position_mm"] == pytest.approx([100.0, -200.0, 300.0])
     assert np.diag(entry["covariance_mm_deg"]) == pytest.approx([1.0] * 3 + [4.0] * 3)

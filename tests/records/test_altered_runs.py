@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import read_timing
 from apo_bench.benchmark.report.comparison.compare import compare
-from apo_bench.benchmark.report.comparison.text import comparison_form
+from apo_bench.benchmark.report.comparison.text import make_comparison_form
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.trials import read_trials
 
@@ -27,7 +27,7 @@ def read(folder: Path) -> None:
     read_trials(folder)
     read_run(folder)
     list(read_timing(folder))
-    json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
+    json.dumps(make_comparison_form(compare(folder, KEPT)), allow_nan=False)
 
 
 @pytest.mark.parametrize(

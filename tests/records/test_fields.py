@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.sweeps.worker import timing
+from apo_bench.benchmark.sweeps.worker import make_timing
 from apo_bench.records import RECORD_FIELDS, REQUIRED
-from apo_bench.records.run.validation import TIMING_FIELDS, record_of, timing_of, unwritable
-from apo_bench.trial.record_start_and_end import record_lost_trial, record_misbehaviour
+from apo_bench.records.run.validation import TIMING_FIELDS, decode_record, decode_timing, describe_unwritable
+from apo_bench.trial.record_start_and_end import record_corrector_failure, record_lost_trial
 
 SPEC = TrialConfig("block_on_block", noise_mm=3.0, noise_deg=2.0, method="paper", seed=2)
 
@@ -22,7 +22,7 @@ def made() -> list[dict[str, Any]]:
     scene = build_scene(load_scenario("block_on_block"))
     return [
         run_trial(SPEC, scene),
-        record_misbehaviour(SPEC, "0", "ok", "it raised\n\x1b" + "x" * 5000),
+        record_corrector_failure(SPEC, "0", "ok", "it raised\n\x1b" + "x" * 5000),
         record_lost_trial(SPEC, "0", "time_limit"),
     ]
 
@@ -30,9 +30,9 @@ def made() -> list[dict[str, Any]]:
 def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
     for row in made:
         line = json.dumps(row, allow_nan=False).encode()
-        assert record_of(line, "line 1") == dict.fromkeys(RECORD_FIELDS) | row
-        times = timing(row, None, 0.1, 0.2, {"worker": 0})
-        assert timing_of(json.dumps(times).encode(), "line 1") == times
+        assert decode_record(line, "line 1") == dict.fromkeys(RECORD_FIELDS) | row
+        times = make_timing(row, None, 0.1, 0.2, {"worker": 0})
+        assert decode_timing(json.dumps(times).encode(), "line 1") == times
         assert set(times) == set(TIMING_FIELDS)
 
 
@@ -47,13 +47,13 @@ def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
     ],
 )
 def test_a_record_that_could_not_be_read_is_not_written(changed: dict[str, Any], made: list[dict[str, Any]]) -> None:
-    assert unwritable(made[0] | changed)
+    assert describe_unwritable(made[0] | changed)
 
 
 def test_what_every_record_has_is_required(made: list[dict[str, Any]]) -> None:
     for name in REQUIRED:
         row = {key: value for key, value in made[0].items() if key != name}
-        assert f"`{name}`" in unwritable(row)
+        assert f"`{name}`" in describe_unwritable(row)
 
 
 def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from apo_bench.assembly import ReobservingCorrector
 from apo_bench.benchmark.analysis import rank_method
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTORS, knows_truth, may_reobserve, parse_method, probes, uses_contacts
-from apo_bench.records.methods import checked_method
+from apo_bench.records.methods import check_method
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from apo_bench.records.methods import checked_method
     ],
 )
 def test_a_name_has_a_plan_and_what_the_robot_does_besides(name, plan, spiral, probe):
-    assert parse_method(checked_method(name)) == (plan, spiral, probe)
+    assert parse_method(check_method(name)) == (plan, spiral, probe)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_a_name_has_a_plan_and_what_the_robot_does_besides(name, plan, spiral, p
 )
 def test_a_wrong_name_is_refused(name, said):
     with pytest.raises(InputError, match=said):
-        checked_method(name)
+        check_method(name)
 
 
 def test_what_a_method_meets_is_that_of_its_plan():

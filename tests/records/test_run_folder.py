@@ -21,20 +21,20 @@ import pytest
 from apo_bench import InputError
 from apo_bench.assembly import Outcome
 from apo_bench.records import KEY, RECORD_SCHEMA
-from apo_bench.records.run.run_file import run_record
+from apo_bench.records.run.run_file import make_run_record
 from apo_bench.records.run.run_folder import RunFolder, read_records
-from apo_bench.trial.fingerprint import versions
+from apo_bench.trial.fingerprint import list_versions
 from apo_bench.trial.record_start_and_end import end_record
 
 GRID = {"scenarios": ["block_on_block"], "noise_level": [1.0], "trials": 60}
 CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}
-VERSIONS = versions()
+VERSIONS = list_versions()
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
 
 
 def run(**changed: Any) -> dict[str, Any]:
     said = {"grids": [GRID], "content": CONTENT, "files": {}, "command": "apo-bench sweep"} | changed
-    return run_record(versions=VERSIONS, **said)
+    return make_run_record(versions=VERSIONS, **said)
 
 
 def row(seed: int) -> dict[str, Any]:

@@ -17,11 +17,11 @@ import pytest
 from apo_bench import InputError, Scene, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.analysis import tally
 from apo_bench.benchmark.report.comparison.compare import compare
-from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.report.report import write_report
 from apo_bench.cli import app as cli
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import SecretSeed, open_secret_seed, read_secret_seed
-from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.replay_command import format_replay_command
 from apo_bench.records.secret_seed import make_secret_seed
 from apo_bench.trial.trial_stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
 from tests import pages
@@ -132,10 +132,10 @@ def test_rows_of_different_salts_are_neither_counted_nor_paired(tmp_path: Path) 
 
 def test_the_report_says_which_salt_and_how_to_run_a_trial_again(tmp_path: Path) -> None:
     out = write(tmp_path / "out", of_salt(HERE.hash))
-    said = pages.words(report(out).page)
+    said = pages.words(write_report(out).page)
     assert HERE.hash in said
     assert "FILE stands for its file" in said
-    plain = report(write(tmp_path / "plain", of_salt(None)))
+    plain = write_report(write(tmp_path / "plain", of_salt(None)))
     assert HERE.hash not in pages.words(plain.page)
 
 
@@ -160,11 +160,11 @@ def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         run_sweep(GRID, here, secret_seed_file=tmp_path / "other")
     assert (here / "trials.jsonl").read_bytes() == before
     capsys.readouterr()
-    command = shlex.split(replay_command(rows[0]))[1:]
+    command = shlex.split(format_replay_command(rows[0]))[1:]
     assert command[command.index("--secret-seed-file") + 1] == "FILE"
     assert cli.main([word if word != "FILE" else str(file) for word in command] + ["--json"]) == 0
     assert json.loads(capsys.readouterr().out) == rows[0]
-    report(here)
+    write_report(here)
     for path in (*here.rglob("*"), *there.rglob("*")):
         if path.is_file():
             content = path.read_bytes()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from apo_bench import Layout, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import compute_placements
 from apo_bench.geometry import pose
-from apo_bench.scenario.human_error import NOTHING_M, compute_human_error_covariance, spread_error
+from apo_bench.scenario.human_error import NEGLIGIBLE_M, compute_human_error_covariance, spread_error
 from apo_bench.scenario.scenario import HumanError
 from apo_bench.scenario.scenario_file import list_scenario_names
 from tests import rounds
@@ -49,11 +49,11 @@ def test_which_operations_show_the_error_and_what_is_left_of_it(name: str, size_
 def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, seed: int):
     """Whatever the direction of the error, the castle follows by what the face says and by nothing else.
 
-    An error below `NOTHING_M` is none, so it may stay open.
+    An error below `NEGLIGIBLE_M` is none, so it may stay open.
     """
     scenario = SCENARIOS["vanished_fixture"]
     truth = layout(scenario, seed)
-    allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
+    allowed = 1e-12 if np.hypot(x, y) > 2.0 * NEGLIGIBLE_M else 2.0 * NEGLIGIBLE_M
     offsets = spread_error(scenario, truth, np.array([x, y, 0.0])).offsets
     shown = truth.poses @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
     poses = compute_placements(scenario.assembly, truth.start, shown)[2]

@@ -7,7 +7,7 @@ import pytest
 from apo_bench import load_scenario
 from apo_bench.geometry import pose
 from apo_bench.scenario.layout import place_layout
-from apo_bench.scenario.operation_order import AIR_M, find_part_in_the_air
+from apo_bench.scenario.operation_order import LARGEST_START_GAP_M, find_floating_part
 from apo_bench.scenario.scenario_file import list_scenario_names
 
 
@@ -16,7 +16,7 @@ def test_every_part_starts_on_something(name: str) -> None:
     scenario = load_scenario(name)
     for clearance_mm in (0.0, 0.25, 1.0):
         start = place_layout(scenario, 0.1, 0.0, 0.0, clearance_mm=clearance_mm).start
-        assert find_part_in_the_air(scenario.assembly, start) is None
+        assert find_floating_part(scenario.assembly, start) is None
 
 
 @pytest.mark.parametrize(("up_mm", "found"), [(0.09, False), (0.11, True)])
@@ -24,6 +24,6 @@ def test_a_start_in_the_air_is_found_from_a_tenth_of_a_millimetre_on(up_mm: floa
     scenario = load_scenario("stick_on_castles")
     up = pose.at((0.0, 0.0, 1e-3 * up_mm))
     start = {**scenario.start, "stick": up @ scenario.start["stick"]}
-    said = find_part_in_the_air(scenario.assembly, start)
-    assert AIR_M == 1e-4
+    said = find_floating_part(scenario.assembly, start)
+    assert LARGEST_START_GAP_M == 1e-4
     assert (said == ("stick", "'stick' starts in the air, 0.11 mm above 'table'")) == found

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Arm, InputError, TrialConfig, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.records.user_code import own_code
+from apo_bench.records.user_code import list_user_code
 from apo_bench.resources import folder
 from apo_bench.simulation.arm_checks.arm_check import check_arm
 from apo_bench.simulation.arms import finding
@@ -135,7 +135,8 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
     monkeypatch.setenv("APO_BENCH_MENAGERIE", str(tmp_path / "none"))
     assert find_arm("robosuite:UR5e").opening_m == pytest.approx(0.0428, abs=2e-4)
     assert (
-        own_code({"arm": "robosuite:UR5e", "method": "contact", "noise": "isotropic", "contact_source": "given"}) == ()
+        list_user_code({"arm": "robosuite:UR5e", "method": "contact", "noise": "isotropic", "contact_source": "given"})
+        == ()
     )
     with pytest.raises(InputError, match="unknown arm 'UR9'"):
         find_arm("robosuite:UR9")

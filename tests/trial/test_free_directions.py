@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from apo_bench import Observation
 from apo_bench.assembly import build_contact_equations
 from apo_bench.geometry import Array
-from apo_bench.trial.free_directions import FreeSpace, free_space, nearest_fitting, shortest_above
+from apo_bench.trial.free_directions import FreeSpace, find_free_space, find_nearest_fitting_poses, find_shortest_above
 from tests import scenes
 
 
@@ -26,7 +26,7 @@ def is_uncorrected(scene: scenes.Scene) -> Observation:
 
 
 def space_of(scene: scenes.Scene) -> FreeSpace:
-    found = free_space(is_uncorrected(scene), scene.nominal_poses)
+    found = find_free_space(is_uncorrected(scene), scene.nominal_poses)
     assert found is not None
     return found
 
@@ -38,7 +38,7 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
     rng = np.random.default_rng(seed)
     G = rng.normal(size=(rows, 5))
     h = rng.normal(size=rows)
-    x = shortest_above(G, h)
+    x = find_shortest_above(G, h)
     assert x is not None
     assert (G @ x >= h - 1e-8).all()
     met = np.abs(G @ x - h) < 1e-8
@@ -68,7 +68,7 @@ def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_
         far = 1e3 * np.abs(goals - space.poses)[:, :3, 3].max()
         return np.array([1.0 if far < 1.0 else -1.0])
 
-    found = nearest_fitting(space, lambda goals: True, flat)
+    found = find_nearest_fitting_poses(space, lambda goals: True, flat)
     assert found is not None
     assert 1.0 <= 1e3 * np.abs(found - space.poses)[:, :3, 3].max() < 1.5
-    assert nearest_fitting(space, lambda goals: False, flat) is None
+    assert find_nearest_fitting_poses(space, lambda goals: False, flat) is None

@@ -14,7 +14,7 @@ import trimesh
 
 import apo_bench
 from apo_bench.resources import folder
-from apo_bench.trial.input_files import module_files
+from apo_bench.trial.input_files import list_module_files
 
 AUDITED = """
 import json, os, sys
@@ -210,9 +210,9 @@ def test_a_module_counts_with_what_it_imports_from_the_same_place(
     for name, source in sources.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(source)
-    found = {file.relative_to(tmp_path).as_posix() for file in module_files("kit_of_tests.main")}
+    found = {file.relative_to(tmp_path).as_posix() for file in list_module_files("kit_of_tests.main")}
     assert found == set(sources) - {"kit_of_tests/unused.py"}
-    assert module_files("no_such_module_of_tests") == module_files("builtins") == ()
-    inside = {file.parent.parts[-1] for file in module_files("shapely.affinity")}
+    assert list_module_files("no_such_module_of_tests") == list_module_files("builtins") == ()
+    inside = {file.parent.parts[-1] for file in list_module_files("shapely.affinity")}
     assert "shapely" in inside
     assert "numpy" not in inside

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from apo_bench.assembly import Poses, ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
-from apo_bench.trial.pose_error import pose_errors
+from apo_bench.trial.pose_error import measure_pose_errors
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -31,7 +31,7 @@ def errors(scene: scenes.Scene, wrong: Mapping[int, Array]) -> tuple[float | Non
     goals = scene.nominal_poses.copy()
     for k, T in wrong.items():
         goals[k - 1] = goals[k - 1] @ T
-    return pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
+    return measure_pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
 
 
 FIXED_AND_FREE = [
@@ -57,13 +57,13 @@ def test_the_two_parts_add_up_and_no_frame_matters(seed: int) -> None:
     scene = scenes.stick_in_tower()
     xi = rng.standard_normal((3, 6)) * np.repeat([2e-3, 0.02], 3)
     goals = scene.nominal_poses @ pose.exp(xi)
-    fixed, free = pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
+    fixed, free = measure_pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
     assert fixed is not None
     assert free is not None
     scaled = xi * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed**2 + free**2 == pytest.approx((scaled**2).sum() / 3)
     moved = scenes.turned(scene, pose.exp(rng.standard_normal(6)))
     there = reached(moved, moved.nominal_poses @ pose.exp(xi))
-    assert pose_errors(moved.assembly, moved.start, moved.nominal_poses, there) == pytest.approx(
+    assert measure_pose_errors(moved.assembly, moved.start, moved.nominal_poses, there) == pytest.approx(
         (fixed, free), abs=1e-6
     )

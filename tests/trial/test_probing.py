@@ -8,7 +8,7 @@ import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.validation import unwritable
+from apo_bench.records.run.validation import describe_unwritable
 
 FELT = (
     "probe_contacts",
@@ -41,7 +41,7 @@ def test_a_row_says_what_was_felt_and_with_what(scene: Scene) -> None:
     assert found["probe_contacts"]
     for column in FELT[2:]:
         assert dict(found)[column] > 0.0
-    assert unwritable(found) == ""
+    assert describe_unwritable(found) == ""
 
 
 def test_a_robot_that_does_not_feel_says_nothing(scene: Scene) -> None:

@@ -25,7 +25,7 @@ from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, outcomes
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
-from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash
 from apo_bench.trial.run import run_measured
 from apo_bench.trial.trial_stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 
@@ -143,14 +143,16 @@ def test_a_noise_model_may_be_the_object_itself(scene: Scene, shown: SimulatedDe
 
 
 def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
-    content = content_hash(scene.scenario, "stick_in_tower", scene.arm.files)
-    same = {config_hash(replace(SPEC, method=m, seed=k), content) for m in ("uncorrected", "paper") for k in (0, 9)}
+    content = compute_content_hash(scene.scenario, "stick_in_tower", scene.arm.files)
+    same = {
+        compute_config_hash(replace(SPEC, method=m, seed=k), content) for m in ("uncorrected", "paper") for k in (0, 9)
+    }
     assert len(same) == 1
     others = {"noise_mm": 2.0, "noise_deg": 2.0, "human_error_scale": 0.0, "clearance_mm": 0.5, "noise": "a:b"}
     others |= {"grasp": "friction", "arm": "a:b", "timestep_s": 0.0005}
-    changed = {config_hash(replace(SPEC, **{key: value}), content) for key, value in others.items()}
+    changed = {compute_config_hash(replace(SPEC, **{key: value}), content) for key, value in others.items()}
     assert len(changed | same) == len(others) + 1
-    assert config_hash(SPEC, content, "measured") not in same
+    assert compute_config_hash(SPEC, content, "measured") not in same
     assert all(len(h) == 16 and int(h, 16) >= 0 for h in same)
 
 
@@ -158,8 +160,8 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     scenario = scene.scenario
     path = tmp_path / "stick_in_tower.toml"
     path.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
-    first = content_hash(scenario, "stick_in_tower", scene.arm.files)
-    assert content_hash(scenario, path, scene.arm.files) == first
+    first = compute_content_hash(scenario, "stick_in_tower", scene.arm.files)
+    assert compute_content_hash(scenario, path, scene.arm.files) == first
     path.write_bytes(path.read_bytes() + b"# a word\n")
     arm = tmp_path / "arm.xml"
     arm.write_text("<mujoco/>")
@@ -169,12 +171,14 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     wider = replace(scenario, clearance_mm=0.5)
     hashes = {
         first,
-        content_hash(scenario, path, scene.arm.files),
-        content_hash(scenario, "stick_in_tower", arm),
-        content_hash(replace(scenario, part_files={**scenario.part_files, "castle1": part}), "stick_in_tower", arm),
-        content_hash(stricter, "stick_in_tower", scene.arm.files),
-        content_hash(scenario, scenario, scene.arm.files),
-        content_hash(wider, wider, scene.arm.files),
+        compute_content_hash(scenario, path, scene.arm.files),
+        compute_content_hash(scenario, "stick_in_tower", arm),
+        compute_content_hash(
+            replace(scenario, part_files={**scenario.part_files, "castle1": part}), "stick_in_tower", arm
+        ),
+        compute_content_hash(stricter, "stick_in_tower", scene.arm.files),
+        compute_content_hash(scenario, scenario, scene.arm.files),
+        compute_content_hash(wider, wider, scene.arm.files),
     }
     assert len(hashes) == 7
 

@@ -8,7 +8,7 @@ import pytest
 
 from apo_bench.assembly import Graph, build_relation_graph
 from apo_bench.viz.graph_picture import draw_graph, place_nodes
-from apo_bench.viz.graph_text import graph_form, graph_lines
+from apo_bench.viz.graph_text import format_graph, make_graph_form
 from tests import rounds, scenes
 
 SOME = [None, *([2e-3] * 8)]
@@ -50,7 +50,7 @@ def test_words_dashes_and_colours_are_in_the_picture(tmp_path: Path, monkeypatch
 def test_residuals_are_shown_with_the_gap_that_they_exceed() -> None:
     graph = graph_of("pockets", 6)
     residuals = [None, *([2e-3] * 7), 5e-5]
-    lines = graph_lines(graph, residuals, 1e-4)
+    lines = format_graph(graph, residuals, 1e-4)
     arcs = [line for line in lines if line.startswith("R")]
     assert arcs[0].endswith("]")
     assert all(line.endswith("2.000 mm, above 0.1") for line in arcs[1:8])
@@ -61,6 +61,6 @@ def test_residuals_are_shown_with_the_gap_that_they_exceed() -> None:
         "cube2 (2): T2",
         "cube3 (3): T3",
     ]
-    form = graph_form("pockets", graph, residuals)
+    form = make_graph_form("pockets", graph, residuals)
     assert [arc["residual_mm"] for arc in form["arcs"]] == [None, *([2.0] * 7), 0.05]
     assert [node["stands"] for node in form["nodes"]] == [True, False, False, False, True, True, True, True]

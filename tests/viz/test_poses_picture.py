@@ -9,15 +9,15 @@ import pytest
 
 from apo_bench import Observation, correct, load_scenario
 from apo_bench.cli import app as cli
-from apo_bench.formats.observation import as_planned
-from apo_bench.viz.poses_picture import poses_lines, poses_panel
+from apo_bench.formats.observation import make_nominal_observation
+from apo_bench.viz.poses_picture import format_poses, make_poses_panel
 
 SHIFT_M = 2e-3
 
 
 def lifted() -> Observation:
     """Example 5.1 with castle 2 seen 2 mm too high, and the stick half a millimetre."""
-    seen = as_planned(load_scenario("stick_in_tower"), 1.0, 1.0)
+    seen = make_nominal_observation(load_scenario("stick_in_tower"), 1.0, 1.0)
     goals = np.array(seen.poses)
     goals[1, 2, 3] += SHIFT_M
     goals[2, 2, 3] += SHIFT_M / 4
@@ -26,14 +26,14 @@ def lifted() -> Observation:
 
 def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     seen = lifted()
-    found = poses_panel("observed", seen, seen.poses, 3)
+    found = make_poses_panel("observed", seen, seen.poses, 3)
     assert found.gap_m == pytest.approx(SHIFT_M)
     wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
     assert found.open == wrong
     np.testing.assert_array_equal(found.poses["castle2"], seen.poses[1])
-    mended = poses_panel("corrected", seen, correct(seen, "contact").poses, 3)
+    mended = make_poses_panel("corrected", seen, correct(seen, "contact").poses, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
-    assert poses_lines([mended]) == ["corrected: largest gap 0.000 mm; all contacts hold"]
+    assert format_poses([mended]) == ["corrected: largest gap 0.000 mm; all contacts hold"]
 
 
 def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
-from apo_bench.viz.probing_form import probing_form
+from apo_bench.viz.probing_form import make_probing_form
 from tests.viz.test_robot_form import BASE, TOOL, matrix
 
 FRAMES = {"tip": RobotFrames(), "flange": RobotFrames(BASE, TOOL, "wxyz")}
@@ -37,7 +37,7 @@ def plan(name: str) -> Plan:
 
 @cache
 def form(name: str, frames: str = "tip", sensor: str = "wrist") -> dict[str, Any]:
-    return json.loads(json.dumps(probing_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
+    return json.loads(json.dumps(make_probing_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
 
 
 def tip(said: dict[str, Any], frames: str) -> Array:

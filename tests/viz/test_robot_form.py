@@ -13,8 +13,8 @@ from apo_bench.assembly import Step
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import place_layout
-from apo_bench.viz.plan_text import plan_lines
-from apo_bench.viz.robot_form import robot_form
+from apo_bench.viz.plan_text import list_plan_lines
+from apo_bench.viz.robot_form import make_robot_form
 
 BASE = pose.at((-0.4, 0.1, 0.02), (0.0, 0.0, 30.0))
 TOOL = pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
@@ -24,7 +24,7 @@ def form(name: str, frames: RobotFrames) -> dict[str, Any]:
     scenario = load_scenario(name)
     layout = place_layout(scenario, 0.1, 0.0, 0.3)
     plan = Plan(scenario.assembly, layout.start, layout.poses)
-    return robot_form(plan_lines(plan, scenario), plan, scenario, frames)
+    return make_robot_form(list_plan_lines(plan, scenario), plan, scenario, frames)
 
 
 def matrix(said: dict[str, list[float]]) -> Array:
@@ -67,7 +67,7 @@ def test_a_reader_rebuilds_the_plan_from_the_file_alone(name: str, frames: Robot
     assert {part for part, one in said["parts"].items() if one["fixed"]} == set(scenario.assembly.fixed)
     for step, operation in zip(said["steps"], scenario.assembly.operations, strict=True):
         assert (step["part"], *step["carries"]) == operation.moves
-    again = robot_form(plan_lines(plan, scenario), plan, scenario, frames)
+    again = make_robot_form(list_plan_lines(plan, scenario), plan, scenario, frames)
     for one, other in zip(numbers(said), numbers(json.loads(json.dumps(again))), strict=True):
         assert one == other if isinstance(one, str) else abs(one - other) < 1e-6
 
@@ -78,8 +78,8 @@ def test_a_part_that_is_taken_out_again_leaves_its_contacts_one_after_the_other(
     layout = place_layout(scenario, 0.1, 0.0, 0.3)
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1))
     plan = Plan(scenario.assembly, layout.start, layout.poses, schedule)
-    lines = plan_lines(plan, scenario)
-    undone = robot_form(lines, plan, scenario, RobotFrames())["steps"][2]
+    lines = list_plan_lines(plan, scenario)
+    undone = make_robot_form(lines, plan, scenario, RobotFrames())["steps"][2]
     departs = len(lines[2].leaves.departs)
     first, second = undone["motions"][:departs]
     assert undone["undo"]

@@ -8,14 +8,14 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.scenario.scenario_file import list_scenario_names
-from apo_bench.viz.task_sheet import task_sheet
+from apo_bench.viz.task_sheet import write_task_sheet
 from docs.task_sheets import page
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 
 
 def test_the_operations_of_fig_6() -> None:
-    text = task_sheet(load_scenario("pocket_table"))
+    text = write_task_sheet(load_scenario("pocket_table"))
     for line in (
         "3. cube3: R3 cube3 -> table (nz-top), R4 cube3 -> cube1 (px-nx)",
         "4. cube1: R5 cube1 -> table (nz-top); ends R1, R4",
@@ -28,18 +28,18 @@ def test_the_operations_of_fig_6() -> None:
 
 
 def test_parts_that_follow_a_human_error() -> None:
-    lines = task_sheet(load_scenario("vanished_fixture")).splitlines()
+    lines = write_task_sheet(load_scenario("vanished_fixture")).splitlines()
     error = "operation 2 displaces cube by 1.5 to 4 mm along its y axis; castle2 (operation 3) follows"
     assert f"- Human error: {error}." in lines
-    assert "follow" not in task_sheet(load_scenario("carried_bridge"))
-    assert "- Human error: none." in task_sheet(load_scenario("bridge_cycle")).splitlines()
+    assert "follow" not in write_task_sheet(load_scenario("carried_bridge"))
+    assert "- Human error: none." in write_task_sheet(load_scenario("bridge_cycle")).splitlines()
 
 
 def test_what_is_particular_to_a_verdict() -> None:
-    text = task_sheet(load_scenario("fixture_alignment"))
+    text = write_task_sheet(load_scenario("fixture_alignment"))
     assert "- Verdict: as demonstrated." in text
     assert "- Fixtures: B." in text
-    assert "- Allowed gaps beyond the clearance: " in task_sheet(load_scenario("dovetail"))
+    assert "- Allowed gaps beyond the clearance: " in write_task_sheet(load_scenario("dovetail"))
 
 
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")

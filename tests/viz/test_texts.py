@@ -14,9 +14,9 @@ from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
-from apo_bench.viz.correct_text import correction_form, correction_lines
-from apo_bench.viz.detection_text import CONTACT_COLUMNS, detection_form
-from apo_bench.viz.form_text import form_table
+from apo_bench.viz.correct_text import format_correction, make_correction_form
+from apo_bench.viz.detection_text import CONTACT_COLUMNS, make_detection_form
+from apo_bench.viz.form_text import make_table
 from tests import scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
@@ -53,8 +53,8 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     observation = tower()
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
     recognised = DetectedContacts(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
-    form = detection_form("tower", "detected", observation, recognised, False)
-    _, right, wrong = table_lines(form_table(form["contacts"], CONTACT_COLUMNS))
+    form = make_detection_form("tower", "detected", observation, recognised, False)
+    _, right, wrong = table_lines(make_table(form["contacts"], CONTACT_COLUMNS))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
     assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
     assert wrong == ["1", "castle1.py", "table.top", *numbers, "False"]
@@ -71,8 +71,8 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
     observation = tower()
     test = Consistency(np.inf, 13, 0.0, 0.01)
     failed = corrected(observation, status="inconsistent", gap_before_m=np.inf, test=test)
-    form = correction_form("tower", "contact", observation, failed, None, False)
+    form = make_correction_form("tower", "contact", observation, failed, None, False)
     assert (form["gap_before_mm"], form["gap_after_mm"], form["operations"]) == (None, None, None)
     assert form["test"]["chi_square"] is None
     json.dumps(form, allow_nan=False)
-    assert dict(correction_lines(form, failed))["test"].endswith("the contacts contradict each other")
+    assert dict(format_correction(form, failed))["test"].endswith("the contacts contradict each other")

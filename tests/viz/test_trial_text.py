@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.assembly import Outcome
 from apo_bench.trial.record_start_and_end import end_record
-from apo_bench.viz.trial_text import summary_lines
+from apo_bench.viz.trial_text import format_summary
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -26,14 +26,14 @@ def record(success: bool, code: str = "gap", **more: Any) -> Any:
     ],
 )
 def test_the_fourth_line_is_the_number_that_decides(code: str, numbers: dict[str, Any], line: tuple[str, str]) -> None:
-    lines = summary_lines(record(False, code, **({"worst_gap_mm": None} | numbers)), "stick_in_tower")
+    lines = format_summary(record(False, code, **({"worst_gap_mm": None} | numbers)), "stick_in_tower")
     assert len(lines) == 6
     assert lines[3] == line
 
 
 def test_the_last_line_shows_the_trial_again() -> None:
     file = "own/tower.toml"
-    assert summary_lines(record(True), file)[5][1].startswith(f"apo-bench run {file} ")
-    measured = summary_lines(record(True, noise_mm=None, noise_deg=None), file, Path("seen.csv"))
+    assert format_summary(record(True), file)[5][1].startswith(f"apo-bench run {file} ")
+    measured = format_summary(record(True, noise_mm=None, noise_deg=None), file, Path("seen.csv"))
     assert measured[5][1] == f"apo-bench run {file} --clearance-mm 0.25 --method contact --observation seen.csv --view"
     assert "measured observation" in measured[0][1]

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import rank_contact_source, rank_method
-from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
+from apo_bench.benchmark.analysis.rates import Rate, Records, compute_root_mean_square
 from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.records import knows_truth
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Trials, make_trials
 
 _AXES = ("scenario", "noise", "contact_source", "method")
 
@@ -20,19 +20,19 @@ def tabulate_calibration(records: Records) -> list[Line]:
     region, and the errors of planned poses along directions that contacts fix and leave free. It also states how often
     the test fails, and how often it then suspects the wrong contact.
     """
-    trials = trials_of(records)
+    trials = make_trials(records)
     counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
     groups = trials.where(counted & ~trials.holds("method", knows_truth)).parts(_AXES)
-    return [_line(dict(zip(_AXES, key, strict=True)), groups[key]) for key in sorted(groups, key=_order)]
+    return [_make_line(dict(zip(_AXES, key, strict=True)), groups[key]) for key in sorted(groups, key=_sort_key)]
 
 
-def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+def _sort_key(key: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return the sort key of a line: scenario, noise, given contacts first, method."""
     scenario, noise, contact_source, method = key
     return scenario, noise, rank_contact_source(contact_source), rank_method(method), method
 
 
-def _line(axes: Line, trials: Trials) -> Line:
+def _make_line(axes: Line, trials: Trials) -> Line:
     """Return the line of a group of trials.
 
     Args:
@@ -53,9 +53,9 @@ def _line(axes: Line, trials: Trials) -> Line:
     return axes | {
         "planned": len(planned),
         "covered": Rate(int(np.nansum(inside)), int((~np.isnan(inside)).sum())),
-        "fixed_mm": root_mean_square(fixed),
-        "fixed_over_clearance": root_mean_square(fixed[loose] / clearance[loose]),
-        "free_mm": root_mean_square(np.nan_to_num(planned.number("planned_error_free_mm"))),
+        "fixed_mm": compute_root_mean_square(fixed),
+        "fixed_over_clearance": compute_root_mean_square(fixed[loose] / clearance[loose]),
+        "free_mm": compute_root_mean_square(np.nan_to_num(planned.number("planned_error_free_mm"))),
         "failed_tests": Rate(int((passes == 0).sum()), int((~np.isnan(passes)).sum())),
         "culprits": Rate(sum(named), len(named)),
     }

@@ -29,13 +29,13 @@ _OTHERS = tuple(
 )
 
 
-def _other_fields() -> Iterator[tuple[str, Any, Any]]:
+def _list_other_fields() -> Iterator[tuple[str, Any, Any]]:
     """Yield each further setting as a field for `make_dataclass`."""
     for name in _OTHERS:
         yield name, Any, field(default=SETTINGS[name].default, kw_only=True)
 
 
-_Others: Any = make_dataclass("_Others", _other_fields(), frozen=True)
+_Others: Any = make_dataclass("_Others", _list_other_fields(), frozen=True)
 """One field for each further setting that distinguishes trials."""
 
 
@@ -169,7 +169,7 @@ def group_by_condition(trials: Trials) -> dict[Condition, Trials]:
     return {condition: found[condition] for condition in sorted(found, key=make_sort_key)}
 
 
-def by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
+def group_by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
     """Group trials by scenario and method, sorted as conditions are."""
     groups = trials.parts(("scenario", "method"))
     return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank_method(key[1]), key[1]))}

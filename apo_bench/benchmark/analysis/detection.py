@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.benchmark.analysis.rates import Rate, Records
 from apo_bench.benchmark.analysis.table_line import ALL, Line
 from apo_bench.records import DETECTED
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Trials, make_trials
 
 _AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_mm", "noise_deg")
 
@@ -18,7 +18,7 @@ def tabulate_detection(records: Records) -> list[Line]:
     With several scenarios there are also lines over all of them. All methods of one seed get the same contacts, so each
     observation counts once. A demonstration is complete if exactly its contacts were detected.
     """
-    trials = trials_of(records)
+    trials = make_trials(records)
     known = ~np.isnan(trials.number("contacts_true_positive")) & ~np.isnan(trials.number("noise_mm"))
     detected = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
     observations = detected.groups((*_AXES, "seed", "clearance_mm")).of
@@ -26,10 +26,10 @@ def tabulate_detection(records: Records) -> list[Line]:
     parts = once.parts(_AXES)
     if len(once.distinct("scenario")) > 1:
         parts |= {(ALL, *key): own for key, own in once.parts(_AXES[1:]).items()}
-    return [_line(dict(zip(_AXES, key, strict=True)), parts[key]) for key in sorted(parts, key=_order)]
+    return [_make_line(dict(zip(_AXES, key, strict=True)), parts[key]) for key in sorted(parts, key=_sort_key)]
 
 
-def _line(axes: Line, trials: Trials) -> Line:
+def _make_line(axes: Line, trials: Trials) -> Line:
     """Return the line of a group of observations, identified by `axes`."""
     missed = trials.number("contacts_false_negative")
     false = trials.number("contacts_false_positive")
@@ -45,7 +45,7 @@ def _line(axes: Line, trials: Trials) -> Line:
     }
 
 
-def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+def _sort_key(key: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return a sort key: all scenarios last, contact sources in the order of `DETECTED`."""
     scenario, noise, pose_source, contact_source, *rest = key
     return (scenario == ALL, scenario, noise, pose_source, DETECTED.index(contact_source), *rest)

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import by_method
+from apo_bench.benchmark.analysis.condition import group_by_method
 from apo_bench.benchmark.analysis.rates import Records
 from apo_bench.benchmark.analysis.table_line import Line
-from apo_bench.records.run.trials import trials_of
+from apo_bench.records.run.trials import make_trials
 
 
 def tabulate_effort(records: Records) -> list[Line]:
     """Return one line per scenario and method: means, medians and maxima over its successes in all conditions."""
-    trials = trials_of(records)
+    trials = make_trials(records)
     right = trials.where(trials.number("success") == 1)
     return [
         {
@@ -21,5 +21,5 @@ def tabulate_effort(records: Records) -> list[Line]:
             "sim_time_s": float(np.median(own.number("sim_time_s"))),
             "placed_part_shift_mm": float(np.nan_to_num(own.number("placed_part_shift_mm")).max()),
         }
-        for (scenario, method), own in by_method(right).items()
+        for (scenario, method), own in group_by_method(right).items()
     ]

@@ -58,24 +58,24 @@ class HalfLevel:
         return f"> {over}" if self.surely_under is None else f"{over} to {self.surely_under:g}"
 
 
-def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
+def estimate_half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
     """MeanEstimate one half level per method and setting with at least two levels, in the order of the conditions.
 
     The oracle has none, since noise does not affect it. On a curve a level has equal numbers of mm and degrees (no
     degrees with the depth camera); other conditions are left out.
     """
     curves = group_by((c.curve, c) for c in cells if c.trials and _is_usual(c) and not knows_truth(c.method))
-    return tuple(half_level(condition, own) for condition, own in curves.items() if len(own) > 1)
+    return tuple(estimate_half_level(condition, own) for condition, own in curves.items() if len(own) > 1)
 
 
-def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLevel:
+def estimate_half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLevel:
     """MeanEstimate the level at which success crosses one half from the results at rising levels."""
     from scipy.optimize import isotonic_regression
 
     levels = np.array([c.noise_mm for c in cells])
     right = np.array([c.successes for c in cells])
     trials = np.array([c.trials for c in cells])
-    over, under = map(int, sure(right, trials))
+    over, under = map(int, count_sure_levels(right, trials))
     met = levels > 0  # levels that have a logarithm
     x = np.log(levels[met])
     falling = isotonic_regression((right / trials)[met], weights=trials[met], increasing=False).x
@@ -93,7 +93,7 @@ def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLe
     )
 
 
-def sure(right: Array, trials: Array) -> tuple[Array, Array]:
+def count_sure_levels(right: Array, trials: Array) -> tuple[Array, Array]:
     """Count the levels, from the smallest on, with success surely over one half, and from the largest on, under it.
 
     Args:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.paired import compute_tango_interval, mcnemar
+from apo_bench.benchmark.analysis.paired import compute_mcnemar_p_value, compute_tango_interval
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, compute_wilson_interval
 from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Index
@@ -73,7 +73,7 @@ class Contrast(NamedTuple):
     @property
     def sure(self) -> bool:
         """Whether the difference is significant: 0 is outside the interval, and enough seeds differ for a sign test."""
-        by_chance = mcnemar(self.better, self.worse) > ERROR
+        by_chance = compute_mcnemar_p_value(self.better, self.worse) > ERROR
         # with one trial per seed, McNemar's test is the sign test
         differ = not by_chance if self.trials == self.seeds else self.better + self.worse >= FEWEST_SEEDS
         return differ and not self.interval.low <= 0.0 <= self.interval.high
@@ -81,7 +81,7 @@ class Contrast(NamedTuple):
 
 def pool_rate(results: Results) -> PooledRate:
     """Return the success rate of a method over all its trials, of which there must be at least one."""
-    values, most = _by_seed(results.seed, results.success)  # successes per seed, and the most possible
+    values, most = _sum_by_seed(results.seed, results.success)  # successes per seed, and the most possible
     right = int(results.success.sum())
     trials = len(results.seed)
     low, high = compute_wilson_interval(right, trials) if len(values) == trials else mean_interval(values, 0.0, most)
@@ -96,7 +96,7 @@ def contrast(first: Results, second: Results) -> Contrast | None:
     ours = first.success[i]
     theirs = second.success[j]
     apart = ours - theirs  # 1, 0 or -1 per trial
-    values, most = _by_seed(first.seed[i], apart)
+    values, most = _sum_by_seed(first.seed[i], apart)
     if len(values) == len(apart):
         interval = compute_tango_interval(int((apart > 0).sum()), int((apart < 0).sum()), len(apart))
     else:
@@ -155,10 +155,10 @@ def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interva
     different, counts = np.unique(np.asarray(values, dtype=float), return_counts=True)
     mean = float(np.clip((different * counts).sum() / counts.sum(), low, high))
     sample = (different, counts.astype(float), low, high)
-    return Interval(_end(*sample, mean, low), _end(*sample, mean, high))
+    return Interval(_find_interval_end(*sample, mean, low), _find_interval_end(*sample, mean, high))
 
 
-def _end(values: Array, counts: Array, low: float, high: float, inside: float, outside: float) -> float:
+def _find_interval_end(values: Array, counts: Array, low: float, high: float, inside: float, outside: float) -> float:
     """Return the end of the interval between the mean of the sample (`inside`) and a bound (`outside`)."""
     from scipy.optimize import brentq
 
@@ -171,7 +171,7 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     return float(brentq(lambda mean: compute_mean_surprise(values, counts, mean, low, high) - most, *ends, xtol=1e-9))
 
 
-def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:
+def _sum_by_seed(seeds: Array, results: Array) -> tuple[Array, float]:
     """Return the sum of the results of each seed, (seeds,), and the largest sum that a seed could have.
 
     Both are divided by the mean number of trials of a seed, so that the mean over seeds equals the mean over trials.

@@ -8,10 +8,17 @@ from typing import TypeVar, final
 import numpy as np
 
 from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
-from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, compute_normal_quantile, mean
+from apo_bench.benchmark.analysis.rates import (
+    CONFIDENCE,
+    Interval,
+    Rate,
+    Records,
+    compute_mean,
+    compute_normal_quantile,
+)
 from apo_bench.geometry import Array
 from apo_bench.records import TrialConfig, affects, knows_truth
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Trials, make_trials
 
 # settings that have their default if they do not affect the reference
 _PAIRED_BY_DEFAULT = ("contact_source", "max_reobservations", "ft_sensor", "assumed_robot_error")
@@ -73,7 +80,7 @@ class PairedComparison:
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
-def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[PairedComparison, ...]:
+def compare_pairs(records: Records, references: Sequence[str] = REFERENCES) -> tuple[PairedComparison, ...]:
     """Compare every method except the oracle with every reference, condition by condition, sorted as `tally` sorts.
 
     A setting that does not affect the reference has its default there, so one reference serves several conditions. The
@@ -82,21 +89,21 @@ def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Pa
     Raises:
         InputError: A trial occurs twice.
     """
-    conditions = group_by_condition(trials_of(records)).items()
+    conditions = group_by_condition(make_trials(records)).items()
     counted = {condition: own.where(~np.isnan(own.number("success"))) for condition, own in conditions}
     cells = {condition: own for condition, own in counted.items() if len(own)}
     pairs = [
-        _paired(condition, reference, cells[condition], cells[other])
+        _compare_trials(condition, reference, cells[condition], cells[other])
         for condition in cells
         for reference in references
-        if not knows_truth(condition.method) and (other := reference_condition(condition, reference)) in cells
+        if not knows_truth(condition.method) and (other := get_reference_condition(condition, reference)) in cells
         if condition.method != reference
     ]
-    raised = holm({_comparison(pair): pair.p for pair in pairs if pair.p is not None})
-    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in pairs)
+    raised = adjust_by_holm({_make_unordered_pair(pair): pair.p for pair in pairs if pair.p is not None})
+    return tuple(replace(pair, p_adjusted=raised.get(_make_unordered_pair(pair))) for pair in pairs)
 
 
-def holm(p: Mapping[K, float]) -> dict[K, float]:
+def adjust_by_holm(p: Mapping[K, float]) -> dict[K, float]:
     """Adjust p-values for multiple tests by Holm's method, which bounds the chance of one false alarm or more.
 
     After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
@@ -109,7 +116,7 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
     return {test: adjusted[test] for test in p}
 
 
-def reference_condition(condition: Condition, reference: str) -> Condition:
+def get_reference_condition(condition: Condition, reference: str) -> Condition:
     """Return the condition of the reference that a condition, or a curve, is compared with.
 
     Settings that do not affect the reference have their defaults there.
@@ -118,12 +125,12 @@ def reference_condition(condition: Condition, reference: str) -> Condition:
     return replace(condition, method=reference, **usual)
 
 
-def _comparison(pair: PairedComparison) -> frozenset[Condition]:
+def _make_unordered_pair(pair: PairedComparison) -> frozenset[Condition]:
     """Return the two compared conditions as an unordered pair."""
-    return frozenset((pair.condition, reference_condition(pair.condition, pair.reference)))
+    return frozenset((pair.condition, get_reference_condition(pair.condition, pair.reference)))
 
 
-def mcnemar(only_first: int, only_second: int) -> float:
+def compute_mcnemar_p_value(only_first: int, only_second: int) -> float:
     """Return the two-sided exact p-value of a split of discordant pairs if both directions are equally likely.
 
     After Q. McNemar, Note on the sampling error of the difference between correlated proportions or percentages,
@@ -160,12 +167,12 @@ def compute_tango_interval(b: float, c: float, n: float) -> Interval:
     d = (b - c) / n
     # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
     # with c == n there is no root: the interval begins at -1
-    low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + _EDGE, d - _EDGE)
-    high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + _EDGE, 1 - _EDGE)
+    low = -1.0 if c == n else brentq(lambda x: _compute_tango_score(b, c, n, x) - z, -1 + _EDGE, d - _EDGE)
+    high = 1.0 if b == n else brentq(lambda x: _compute_tango_score(b, c, n, x) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))
 
 
-def _score(b: float, c: float, n: float, delta: float) -> float:
+def _compute_tango_score(b: float, c: float, n: float, delta: float) -> float:
     """Return Tango's score statistic for a difference delta.
 
     q is the likeliest probability of a pair of kind c, given that difference.
@@ -176,7 +183,7 @@ def _score(b: float, c: float, n: float, delta: float) -> float:
     return float((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
 
 
-def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> PairedComparison:
+def _compare_trials(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> PairedComparison:
     """Compare the trials of two methods at the seeds that both have."""
     _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
     ours = ours.where(i)
@@ -194,15 +201,15 @@ def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) 
         only_method=only_method,
         only_reference=only_reference,
         both=int((right & other_right).sum()),
-        p=mcnemar(only_method, only_reference) if len(right) else None,
+        p=compute_mcnemar_p_value(only_method, only_reference) if len(right) else None,
         p_adjusted=None,
         planned=len(apart),
-        free_mm=mean(apart),
-        free_interval=_student(apart),
+        free_mm=compute_mean(apart),
+        free_interval=_compute_student_interval(apart),
     )
 
 
-def _student(x: Array) -> Interval | None:
+def _compute_student_interval(x: Array) -> Interval | None:
     """Return Student's 95 % interval of a mean, mean -+ t(n - 1) s / sqrt(n); None with fewer than two values."""
     from scipy.stats import sem, t
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import by_method
+from apo_bench.benchmark.analysis.condition import group_by_method
 from apo_bench.benchmark.analysis.rates import Rate, Records, was_executed
 from apo_bench.benchmark.analysis.table_line import ALL, Line
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Trials, make_trials
 
 
 def tabulate_confusion(records: Records) -> list[Line]:
@@ -15,11 +15,11 @@ def tabulate_confusion(records: Records) -> list[Line]:
     `same_operation` are about trials that were rightly predicted to fail. They count those in which the robot stopped
     at an operation, and at the predicted one. Trials without an executed plan count as not executed.
     """
-    trials = trials_of(records)
-    return [*(_line(*key, own) for key, own in by_method(trials).items()), _line(ALL, ALL, trials)]
+    trials = make_trials(records)
+    return [*(_make_line(*key, own) for key, own in group_by_method(trials).items()), _make_line(ALL, ALL, trials)]
 
 
-def _line(scenario: str, method: str, trials: Trials) -> Line:
+def _make_line(scenario: str, method: str, trials: Trials) -> Line:
     """Return the line of a group of trials: counts of each prediction with each outcome."""
     counted = trials.where(~np.isnan(trials.number("success")))
     executed = counted.where(~np.isnan(counted.number("predicted_fails")) & was_executed(counted))

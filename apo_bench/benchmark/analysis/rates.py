@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
 from apo_bench.geometry import Array
-from apo_bench.records.run.trials import Mask, Trials, trials_of
+from apo_bench.records.run.trials import Mask, Trials, make_trials
 
 CONFIDENCE = 0.95
 _CLASSES = 10  # classes of predicted success
@@ -142,16 +142,16 @@ def tally(records: Records) -> tuple[ConditionResult, ...]:
     Raises:
         InputError: A trial occurs twice.
     """
-    return tuple(_count(condition, own) for condition, own in group_by_condition(trials_of(records)).items())
+    return tuple(_count_results(condition, own) for condition, own in group_by_condition(make_trials(records)).items())
 
 
-def mean(numbers: Array) -> float | None:
+def compute_mean(numbers: Array) -> float | None:
     """Return the mean of the numbers that are not NaN; None without any."""
     known = numbers[~np.isnan(numbers)]
     return float(known.mean()) if len(known) else None
 
 
-def root_mean_square(x: Array) -> float | None:
+def compute_root_mean_square(x: Array) -> float | None:
     """Return the root mean square; None without a number."""
     return math.sqrt(float(np.mean(x**2))) if len(x) else None
 
@@ -161,7 +161,7 @@ def was_executed(trials: Trials) -> Mask:
     return ~trials.holds("failure_stage", NOT_EXECUTED.__contains__)
 
 
-def _count(condition: Condition, trials: Trials) -> ConditionResult:
+def _count_results(condition: Condition, trials: Trials) -> ConditionResult:
     """Return the results of the trials of a condition."""
     counted = trials.where(~np.isnan(trials.number("success")))  # success is unknown if the demonstration failed
     failed = counted.where(counted.number("success") == 0)
@@ -174,16 +174,16 @@ def _count(condition: Condition, trials: Trials) -> ConditionResult:
         loose_successes=int(np.nansum(counted.number("loose_success"))),
         not_executed=int((~was_executed(counted)).sum()),
         abstained=sum(code == "abstained" for code in failed.values("failure_code")),
-        predicted_success=mean(counted.number("predicted_success")),
-        brier=brier_score(counted),
+        predicted_success=compute_mean(counted.number("predicted_success")),
+        brier=compute_brier_score(counted),
         excluded=len(trials) - len(counted),
         failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
     )
 
 
-def brier_score(counted: Trials) -> float | None:
+def compute_brier_score(counted: Trials) -> float | None:
     """Return the Brier score: the mean squared difference of predicted success and success over executed plans."""
-    return mean((counted.number("predicted_success") - counted.number("success"))[was_executed(counted)] ** 2)
+    return compute_mean((counted.number("predicted_success") - counted.number("success"))[was_executed(counted)] ** 2)
 
 
 def measure_reliability(counted: Trials) -> float | None:

@@ -31,7 +31,7 @@ def list_settings(items: Iterable[Any]) -> list[Condition]:
 def group_by_setting(settings: Sequence[Condition], items: Iterable[_Item]) -> dict[Condition, list[_Item]]:
     """Return the items of every setting, in their order; of several oracles, only the one with most trials."""
     items = list(items)
-    return {s: _one_ceiling([item for item in items if belongs_to(s, item.condition)]) for s in settings}
+    return {s: _keep_largest_oracle([item for item in items if belongs_to(s, item.condition)]) for s in settings}
 
 
 def belongs_to(setting: Condition, condition: Condition) -> bool:
@@ -61,7 +61,7 @@ def get_level_unit(noise: str) -> str:
     return "noise level: mm per ray" if noise == DEPTH_CAMERA else "noise level: mm and degrees per axis"
 
 
-def _one_ceiling(inside: list[_Item]) -> list[_Item]:
+def _keep_largest_oracle(inside: list[_Item]) -> list[_Item]:
     """Keep only the oracle with most trials, since noise and other settings do not affect the oracle."""
     ceilings = [item for item in inside if item.condition.method == "oracle"]
     best = max(ceilings, key=lambda item: getattr(item, "trials", 0), default=None)

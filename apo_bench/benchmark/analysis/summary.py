@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from apo_bench.benchmark.analysis.half_level import HalfLevel, half_levels
-from apo_bench.benchmark.analysis.paired import REFERENCES, PairedComparison, paired
+from apo_bench.benchmark.analysis.half_level import HalfLevel, estimate_half_levels
+from apo_bench.benchmark.analysis.paired import REFERENCES, PairedComparison, compare_pairs
 from apo_bench.benchmark.analysis.rates import ConditionResult, Records, tally
-from apo_bench.records.run.trials import trials_of
+from apo_bench.records.run.trials import make_trials
 
 
 class Summary(NamedTuple):
@@ -26,6 +26,6 @@ def summarise(records: Records, references: Sequence[str] = REFERENCES) -> Summa
     Raises:
         InputError: A trial occurs twice.
     """
-    trials = trials_of(records)
+    trials = make_trials(records)
     results = tally(trials)
-    return Summary(results, paired(trials, references), half_levels(results))
+    return Summary(results, compare_pairs(trials, references), estimate_half_levels(results))

@@ -12,7 +12,7 @@ from apo_bench.benchmark.analysis.condition import rank_method
 from apo_bench.benchmark.analysis.table_line import Line
 from apo_bench.geometry import Array
 from apo_bench.io import read_lines
-from apo_bench.records.run.validation import timing_of
+from apo_bench.records.run.validation import decode_timing
 
 _PARTS = ("compile_s", "demonstrate_s", "trial_s")  # parts of a worker's time
 
@@ -27,7 +27,7 @@ def read_timing(folder: Path) -> Iterator[dict[str, Any]]:
     if not os.path.lexists(path):
         return
     for number, text in read_lines(path, "table of timings"):
-        line = timing_of(text, f"{path}, line {number}")
+        line = decode_timing(text, f"{path}, line {number}")
         if line["trial_s"] is not None:
             yield line
 

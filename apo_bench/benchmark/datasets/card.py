@@ -51,7 +51,7 @@ class DatasetMetadata:
     """Everything that the episodes of a data set have in common."""
 
     name: str
-    """`replays` or `insertions`."""
+    """`record_replays` or `record_insertions`."""
     summary: str
     command: str
     """The command line that made them."""
@@ -91,13 +91,13 @@ def write_card(
     ]
     for title, columns in tables.items():
         lines += ["", f"## {title}", "", "| column | size | unit | frame | what it is |", "|---|---|---|---|---|"]
-        lines += [f"| `{name}` | {' | '.join(_cells(column))} |" for name, column in columns.items()]
+        lines += [f"| `{name}` | {' | '.join(_list_cells(column))} |" for name, column in columns.items()]
         several = {name: c.names for name, c in columns.items() if isinstance(c, Field) and len(c.names) > 1}
         lines += ["", *(f"Numbers of `{name}`: {', '.join(names)}." for name, names in several.items())]
     write_file(out / "README.md", "\n".join(lines) + "\n")
 
 
-def _cells(column: Field | str) -> tuple[str, ...]:
+def _list_cells(column: Field | str) -> tuple[str, ...]:
     """Return size, unit, frame and meaning of a column; of a column described in words only the meaning."""
     if isinstance(column, str):
         return ("", "", "", column)

@@ -94,7 +94,7 @@ _STEPWISE = ("operation", "undoes", "macro")
 """Columns that hold until the next sample; all other columns are interpolated between samples."""
 
 
-class Replay(NamedTuple):
+class ReplayEpisode(NamedTuple):
     """One trial, with the samples of its replay as frames."""
 
     scene: Scene
@@ -115,12 +115,12 @@ class _Recorder:
         self._looks: dict[str, list[Any]] = {name: [] for name in FRAMES if name != "episode"}
 
     def hooks(self) -> Hooks:
-        return Hooks(before_replay=self._planned, after_tick=self._tick)
+        return Hooks(before_replay=self._start_replay, after_tick=self._append_sample)
 
-    def _planned(self, plan: Plan) -> None:
+    def _start_replay(self, plan: Plan) -> None:
         self.plan = plan
 
-    def _tick(self, data: Any, phase: Phase) -> None:
+    def _append_sample(self, data: Any, phase: Phase) -> None:
         """Append a sample; called by the replay every 20 ms."""
         at = [get_part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
@@ -163,7 +163,7 @@ class _Recorder:
         return frames
 
 
-def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Iterator[Replay]:
+def record_replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Iterator[ReplayEpisode]:
     """Run trials, each in the scene of its scenario, and record them.
 
     Raises:
@@ -177,10 +177,10 @@ def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Itera
         )
         with switch_wrist_sensors_on(scene.work.model):
             row = run_trial(settings, scene, simulated=simulated, watch=recorder.hooks())
-        yield Replay(scene, _episode(settings, scene, simulated, row, recorder), recorder.frames())
+        yield ReplayEpisode(scene, _make_episode(settings, scene, simulated, row, recorder), recorder.frames())
 
 
-def write_parquet(found: Iterable[Replay], about: DatasetMetadata, out: Path) -> tuple[int, int]:
+def write_parquet(found: Iterable[ReplayEpisode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write replays as Parquet tables, and the card.
 
     Returns:
@@ -204,7 +204,7 @@ def write_parquet(found: Iterable[Replay], about: DatasetMetadata, out: Path) ->
     return counted
 
 
-def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMetadata:
+def describe_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMetadata:
     """Return the metadata of replays in these scenes, which all have one arm.
 
     Args:
@@ -242,8 +242,8 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMe
     )
 
 
-def replay_rollouts(
-    found: Iterable[Replay], about: DatasetMetadata, say: Callable[[str], None]
+def convert_replays(
+    found: Iterable[ReplayEpisode], about: DatasetMetadata, say: Callable[[str], None]
 ) -> Iterator[RecordedEpisode]:
     """Yield replays as episodes with observations and actions; trials in which nothing moved are left out.
 
@@ -278,7 +278,7 @@ def replay_rollouts(
         )
 
 
-def _episode(
+def _make_episode(
     settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, row: TrialRecord, recorder: _Recorder
 ) -> dict[str, Any]:
     """Return the columns of one episode: record, observation, truth and plan."""
@@ -288,15 +288,15 @@ def _episode(
         **{name: row.get(name) for name in _OF_ROW},
         "parts": recorder.parts,
         "main_parts": [operation.main for operation in seen.assembly.operations],
-        "observed_poses": _flat(seen.poses),
+        "observed_poses": _flatten_poses(seen.poses),
         "covariance": seen.covariance.ravel().tolist(),
         "seen": seen.observed.tolist(),
-        "true_poses": _flat(simulated.layout.poses),
-        "planned_poses": None if plan is None else _flat(plan.target_poses),
+        "true_poses": _flatten_poses(simulated.layout.poses),
+        "planned_poses": None if plan is None else _flatten_poses(plan.target_poses),
         "schedule": None if plan is None else [-(k + 1) if undo else k + 1 for k, undo in plan.schedule],
     }
 
 
-def _flat(poses: Array) -> list[float]:
+def _flatten_poses(poses: Array) -> list[float]:
     """Return poses, (n, 4, 4), as a list of 7 n numbers."""
     return [float(x) for x in pose.pack(poses).ravel()]

@@ -64,9 +64,13 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     Raises:
         OSError: A file cannot be written.
     """
-    fields = {_called(name): field for name, field in about.fields.items()} | {"action": about.action}
+    fields = {_name_observation(name): field for name, field in about.fields.items()} | {"action": about.action}
     # observations to join
-    apart = [] if _TOGETHER in fields else [name for name in fields if name not in (_called("agent_pos"), "action")]
+    apart = (
+        []
+        if _TOGETHER in fields
+        else [name for name in fields if name not in (_name_observation("agent_pos"), "action")]
+    )
     if apart:
         names = tuple(name for each in apart for name in fields[each].names)
         fields[_TOGETHER] = Field(names, "", "", f"{' and '.join(apart)} in one row")
@@ -88,12 +92,14 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
                 path.parent.mkdir(parents=True, exist_ok=True)
                 writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(replace_file(path)), schema))
                 files += 1
-            columns = _columns(rollout, e, frames, tasks.setdefault(rollout.task, len(tasks)))
+            columns = _list_columns(rollout, e, frames, tasks.setdefault(rollout.task, len(tasks)))
             if apart:
                 columns[_TOGETHER] = np.hstack([columns[name] for name in apart])
-            writer.write_table(pa.table([_arrow(columns[each.name], each.type) for each in schema], schema=schema))
+            writer.write_table(pa.table([_to_arrow(columns[each.name], each.type) for each in schema], schema=schema))
             of_episode = (e, [rollout.task], n, frames, frames + n, chunk, file, 0, 0)
-            statistics = {f"stats/{x}/{y}": z for x, column in columns.items() for y, z in _statistics(column).items()}
+            statistics = {
+                f"stats/{x}/{y}": z for x, column in columns.items() for y, z in _compute_statistics(column).items()
+            }
             episodes.append({**dict(zip(_OF_EPISODE, of_episode, strict=True)), **rollout.more, **statistics})
             frames += n
     if not episodes:
@@ -106,7 +112,7 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     return counted
 
 
-def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> dict[str, Array]:
+def _list_columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> dict[str, Array]:
     """Return the columns of one episode with T frames, (T,) or (T, k).
 
     Args:
@@ -116,7 +122,7 @@ def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> 
     n = len(rollout.actions)
     last = np.arange(n) == n - 1
     # without the observation after the last action
-    seen = {_called(name): numbers[:-1] for name, numbers in rollout.observations.items()}
+    seen = {_name_observation(name): numbers[:-1] for name, numbers in rollout.observations.items()}
     own = (
         *(rollout.rewards, last, last & bool(rollout.more["success"]), np.full(n, rollout.seed)),
         *(np.arange(n) / FPS, np.arange(n), np.full(n, episode), before + np.arange(n), np.full(n, task)),
@@ -124,19 +130,19 @@ def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> 
     return {**seen, "action": rollout.actions, **dict(zip(_OWN, own, strict=True))}
 
 
-def _called(name: str) -> str:
+def _name_observation(name: str) -> str:
     """Return the name of an observation in LeRobot."""
     return f"observation.{'state' if name == 'agent_pos' else name}"
 
 
-def _arrow(column: Array, kind: Any) -> Any:
+def _to_arrow(column: Array, kind: Any) -> Any:
     """Return a column as an Arrow array of this type; vectors become lists of fixed size."""
     if pa.types.is_fixed_size_list(kind):
         return pa.FixedSizeListArray.from_arrays(pa.array(column.ravel().astype(np.float32)), type=kind)
     return pa.array(column.ravel()).cast(kind)
 
 
-def _statistics(column: Array) -> dict[str, list[float]]:
+def _compute_statistics(column: Array) -> dict[str, list[float]]:
     """Return the statistics of each number of a column, (T,) or (T, k), under LeRobot's names."""
     x = np.asarray(column, dtype=np.float64).reshape(len(column), -1)
     found = {"min": x.min(axis=0), "max": x.max(axis=0), "mean": x.mean(axis=0), "std": x.std(axis=0)}
@@ -164,7 +170,7 @@ def _write_meta(
     for name in schema.names if frames else ():
         column = parquet.read_table(out / "data", columns=[name])[name].combine_chunks()
         numbers = (column.flatten() if name in fields and len(fields[name].names) > 1 else column).to_numpy(False)
-        statistics[name] = _statistics(numbers.reshape(frames, -1))
+        statistics[name] = _compute_statistics(numbers.reshape(frames, -1))
     info = {
         "codebase_version": "v3.0",
         "robot_type": about.robot,

@@ -59,7 +59,7 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
     steps = right = episodes = 0
     with replace_file(folder / "main_data.hdf5") as file, h5py.File(file, "w", track_order=True) as data:
         for rollout in rollouts:
-            _add(data.create_group(f"episode_{episodes}"), rollout, episodes)
+            _write_episode(data.create_group(f"episode_{episodes}"), rollout, episodes)
             episodes += 1
             steps += len(rollout.actions)
             right += bool(rollout.more["success"])
@@ -70,8 +70,10 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
         "dataset_size": round((folder / "main_data.hdf5").stat().st_size / 1e6, 1),
         "data_format": "hdf5",
         "jpeg_encoding": False,
-        "observation_space": json.dumps({"type": "Dict", "subspaces": {n: _box(f) for n, f in about.fields.items()}}),
-        "action_space": json.dumps(_box(about.action)),
+        "observation_space": json.dumps(
+            {"type": "Dict", "subspaces": {n: _make_box_space(f) for n, f in about.fields.items()}}
+        ),
+        "action_space": json.dumps(_make_box_space(about.action)),
         "minari_version": "0.5.4",  # whose format this is
         "algorithm_name": about.command,
         "author": ["The apo_bench authors"],
@@ -90,11 +92,11 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
     return episodes, right
 
 
-def _add(group: Any, rollout: RecordedEpisode, episode: int) -> None:
+def _write_episode(group: Any, rollout: RecordedEpisode, episode: int) -> None:
     """Write one episode into its HDF5 group."""
     rewards = np.asarray(rollout.rewards, dtype=np.float64)
     of_rewards = {f"rewards_{name}": getattr(rewards, name)() for name in ("max", "min", "mean", "std", "sum")}
-    told = {name: _plain(x) for name, x in rollout.more.items() if x is not None}
+    told = {name: _to_hdf5_type(x) for name, x in rollout.more.items() if x is not None}
     group.attrs.update({**told, "id": episode, "seed": rollout.seed, "total_steps": len(rewards), **of_rewards})
     for name, numbers in rollout.observations.items():
         group.create_dataset(f"observations/{name}", data=numbers.astype(np.float32))
@@ -106,12 +108,12 @@ def _add(group: Any, rollout: RecordedEpisode, episode: int) -> None:
     group.create_dataset("truncations", data=np.zeros(len(rewards), dtype=np.bool_))
 
 
-def _plain(x: Any) -> Any:
+def _to_hdf5_type(x: Any) -> Any:
     """Convert a list of texts to a type that HDF5 takes; other values stay."""
     return np.array(x, dtype=object) if isinstance(x, list) and x and isinstance(x[0], str) else x
 
 
-def _box(field: Field) -> dict[str, Any]:
+def _make_box_space(field: Field) -> dict[str, Any]:
     """Return a field as a `Box` space, in Minari's spelling."""
     high = np.broadcast_to(np.array(field.most, dtype=np.float32), len(field.names))
     shape = [len(field.names)]

@@ -58,7 +58,7 @@ _BY_PART = frozenset(
 
 
 @final
-class Seen(NamedTuple):
+class ObservedBatch(NamedTuple):
     """The observations of n demonstrations with k operations each."""
 
     poses: Array
@@ -69,14 +69,14 @@ class Seen(NamedTuple):
     """(n, k), whether the operation was observed."""
 
 
-def by_part(noise: Noise) -> bool:
+def observes_by_part(noise: Noise) -> bool:
     """Return whether a noise model can observe many demonstrations in one call."""
     return type(noise) in _BY_PART or (isinstance(noise, CameraFailures) and noise.by_part)
 
 
 def observe_many(
     assembly: Assembly, shown: Layouts, human_error: Array, noise: Noise, rng: np.random.Generator
-) -> Seen:
+) -> ObservedBatch:
     """Observe many demonstrations of one assembly by a noise model.
 
     Args:
@@ -84,44 +84,44 @@ def observe_many(
         human_error: Covariance as in a `Demonstration`, (k, 6, 6).
     """
     n, k = shown.poses.shape[:2]
-    if by_part(noise):
-        start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
+    if observes_by_part(noise):
+        start = {_name_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
         long = Demonstration(  # all demonstrations in a row; each has its own copies of the parts
-            _repeated(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error, (n, 1, 1))
+            _repeat_assembly(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error, (n, 1, 1))
         )
-        return _stacked([noise(long.assembly, long, rng)], n, k)
+        return _stack_observations([noise(long.assembly, long, rng)], n, k)
     each = []
     for i, goals in enumerate(shown.poses):
         one = Demonstration(assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, human_error)
         each.append(observe(one, noise, rng))
-    return _stacked(each, n, k)
+    return _stack_observations(each, n, k)
 
 
-def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
+def _stack_observations(observations: list[Observation], n: int, k: int) -> ObservedBatch:
     """Join observations into arrays of n demonstrations with k operations."""
-    return Seen(
+    return ObservedBatch(
         np.concatenate([seen.poses for seen in observations]).reshape(n, k, 4, 4),
         np.concatenate([seen.covariance for seen in observations]).reshape(n, k, 6, 6),
         np.concatenate([seen.observed for seen in observations]).reshape(n, k),
     )
 
 
-def _copy(part: str, i: int) -> str:
+def _name_copy(part: str, i: int) -> str:
     """Return the name of the copy of a part in demonstration i."""
     return f"{part}/{i}"
 
 
 @lru_cache(maxsize=32)
-def _repeated(assembly: Assembly, n: int) -> Assembly:
+def _repeat_assembly(assembly: Assembly, n: int) -> Assembly:
     """Return n copies of the operations, each with parts of its own, and without contacts, which no camera observes."""
     return Assembly(
-        {_copy(part, i): solid for part, solid in assembly.solids.items() for i in range(n)},
+        {_name_copy(part, i): solid for part, solid in assembly.solids.items() for i in range(n)},
         tuple(
-            Operation(_copy(each.main, i), carries=tuple(_copy(part, i) for part in each.carries))
+            Operation(_name_copy(each.main, i), carries=tuple(_name_copy(part, i) for part in each.carries))
             for i in range(n)
             for each in assembly.operations
         ),
-        frozenset(_copy(part, i) for part in assembly.fixed for i in range(n)),
+        frozenset(_name_copy(part, i) for part in assembly.fixed for i in range(n)),
     )
 
 
@@ -225,11 +225,12 @@ def draw_endless_pairs(
     check("human_error_scale", human_error_scale)
     model = make_noise(noise, NoiseLevel(*parse_noise_level(noise_level)))
     loaded = [load_scenario(each) for each in given]
-    return (_block(loaded, model, seed, number, human_error_scale) for number in count())
+    return (_draw_block(loaded, model, seed, number, human_error_scale) for number in count())
 
 
-def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, human_error_scale: float) -> Pairs:
-    """Draw block `number`: `BLOCK` pairs of each of m scenarios, interleaved, so that pair i has scenario i mod m."""
+def _draw_block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, human_error_scale: float) -> Pairs:
+    """Draw block `number`: `BLOCK` pairs of each of m scenarios, interleaved, so that pair i has scenario i mod
+    m."""
     m = len(scenarios)
     n = m * BLOCK
     k = max(len(scenario.assembly) for scenario in scenarios)
@@ -237,9 +238,9 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     covariance = np.tile(np.eye(6), (n, k, 1, 1))
     there = np.zeros((n, k), dtype=np.bool_)
     for i, scenario in enumerate(scenarios):
-        rng = seed_block(seed, scenario.name, number)
+        rng = make_block_generator(seed, scenario.name, number)
         layouts = draw_layouts(scenario, rng, BLOCK)
-        shown = Layouts(layouts.poses @ _mistakes(scenario, human_error_scale, rng), layouts.start)
+        shown = Layouts(layouts.poses @ _draw_human_errors(scenario, human_error_scale, rng), layouts.start)
         seen = observe_many(
             scenario.assembly, shown, compute_human_error_covariance(scenario, human_error_scale), noise, rng
         )
@@ -250,15 +251,15 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     sizes = np.array([len(scenario.assembly) for scenario in scenarios])
     turn = np.tile(np.arange(m), BLOCK)  # scenario of each pair
     names = tuple(scenario.name for scenario in scenarios)
-    return Pairs(goals, covariance, there, truth, sizes[turn], turn, names, by_part(noise))
+    return Pairs(goals, covariance, there, truth, sizes[turn], turn, names, observes_by_part(noise))
 
 
-def seed_block(seed: int, scenario: str, number: int) -> np.random.Generator:
+def make_block_generator(seed: int, scenario: str, number: int) -> np.random.Generator:
     """Return the random generator of one block of a scenario with this name."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 
 
-def _mistakes(scenario: Scenario, human_error_scale: float, rng: np.random.Generator) -> Array:
+def _draw_human_errors(scenario: Scenario, human_error_scale: float, rng: np.random.Generator) -> Array:
     """Draw the human error of every pose in each of `BLOCK` layouts, (BLOCK, k, 4, 4), as in a demonstration."""
     twists = np.zeros((BLOCK, len(scenario.assembly), 6))
     if (how := scenario.human_error) is not None:

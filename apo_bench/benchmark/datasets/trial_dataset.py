@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEpisode
-from apo_bench.benchmark.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
+from apo_bench.benchmark.datasets.episodes import convert_replays, describe_replays, record_replays, write_parquet
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
 from apo_bench.benchmark.sweeps.stop_signals import Check, stop_at_signals
 from apo_bench.envs.policies import POLICIES, insert_env
@@ -27,7 +27,7 @@ from apo_bench.trial.trial_stages import scene_of
 _FRAME = "way in"  # the frame of the insertion axis
 
 
-def _named(*kinds: str) -> tuple[str, ...]:
+def _list_names(*kinds: str) -> tuple[str, ...]:
     """Return the names of the six numbers of each kind of twist."""
     return tuple(f"{kind}_{axis}" for kind in kinds for axis in ("x", "y", "z", "rx", "ry", "rz"))
 
@@ -35,21 +35,30 @@ def _named(*kinds: str) -> tuple[str, ...]:
 _FIELDS: Mapping[str, Field] = MappingProxyType(  # observations and actions of `APOInsert-v0`
     {
         "agent_pos": Field(
-            (*_named("tip", "lag"), "opening"),
+            (*_list_names("tip", "lag"), "opening"),
             "mm, deg",
             _FRAME,
             "front of the part and its turn less those where it is believed to end, by the encoders; what is commanded "
             "less that; opening of a finger less half the width of the part",
         ),
-        "wrench": Field(_named("wrench"), "N, Nm", _FRAME, "on the hand and what is in it, about the flange"),
+        "wrench": Field(_list_names("wrench"), "N, Nm", _FRAME, "on the hand and what is in it, about the flange"),
         "plan": Field(
-            ("way_x", "way_y", "way_z", "left", "least_left", "time_left", *_named("sigma", "last"), "last_gripper"),
+            (
+                "way_x",
+                "way_y",
+                "way_z",
+                "left",
+                "least_left",
+                "time_left",
+                *_list_names("sigma", "last"),
+                "last_gripper",
+            ),
             "mm, deg, s",
             f"{_FRAME}; of the way: world",
             "the way in; what is left of it, now and at least; time left; stated sigmas of the front; the last action",
         ),
         "action": Field(
-            (*_named("shift"), "gripper"),
+            (*_list_names("shift"), "gripper"),
             "1",
             _FRAME,
             "shift and turn of the front, in shift_mm and turn_deg of the environment; above 0.5 the hand opens",
@@ -69,7 +78,7 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(  # column of the table of epi
 )
 
 
-def insertions(
+def record_insertions(
     trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
 ) -> tuple[DatasetMetadata, Iterator[RecordedEpisode]]:
     """Let a policy insert parts, trial by trial.
@@ -105,10 +114,10 @@ def insertions(
         robot=trials[0].arm,
         env_spec=env.spec.to_json() if env.spec and len({each.scenario for each in trials}) == 1 else None,
     )
-    return about, _rollouts(trials, policy, act, say)
+    return about, _run_rollouts(trials, policy, act, say)
 
 
-def _rollouts(
+def _run_rollouts(
     trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]
 ) -> Iterator[RecordedEpisode]:
     """Yield the episodes; a new environment is made for each new scenario."""
@@ -122,12 +131,12 @@ def _rollouts(
             say(str(error))
             continue
         scenario, k = env.scene.scenario, env.operation
-        with _policy(policy):
+        with _name_policy_errors(policy):
             decide = act() if isinstance(act, type) else act
         sights, actions, rewards = [seen], [], []  # observations, actions, rewards
         over = False
         while not over:
-            with _policy(policy):
+            with _name_policy_errors(policy):
                 action = np.asarray(decide(env, seen), dtype=np.float64)
             actions.append(np.clip(action, -1.0, 1.0).astype(np.float32))
             seen, reward, terminated, truncated, info = env.step(actions[-1])
@@ -146,7 +155,7 @@ def _rollouts(
 
 
 @contextmanager
-def _policy(policy: str) -> Iterator[None]:
+def _name_policy_errors(policy: str) -> Iterator[None]:
     """Convert an exception of a policy into an `InputError` that names the policy and its line."""
     try:
         yield
@@ -205,17 +214,17 @@ def make_dataset(
     ends: list[BaseException] = []  # the exceptions that ended the run early
     found: Iterator[Any]
     if policy is not None:
-        about, found = insertions(trials, policy, command, say)
+        about, found = record_insertions(trials, policy, command, say)
     else:
         scenes = {each.scenario: scene_of(each) for each in trials}
-        about = about_replays([*scenes.values()], command, trials[0].arm)
-        found = replays(trials, scenes)
-    with stop_at_signals(patience=1) as check, _unfinished(out):
-        found = _to_the_end(found, ends, check)
+        about = describe_replays([*scenes.values()], command, trials[0].arm)
+        found = record_replays(trials, scenes)
+    with stop_at_signals(patience=1) as check, _mark_unfinished(out):
+        found = _collect_until_error(found, ends, check)
         if form == "parquet":
             counted = write_parquet(found, about, out)
         else:
-            rollouts = found if policy is not None else replay_rollouts(found, about, say)
+            rollouts = found if policy is not None else convert_replays(found, about, say)
             counted = _write_rollouts(form, rollouts, about, out)
     if not counted[0]:  # without an episode, the folder is left as it was
         for each in out.iterdir() if out.is_dir() else ():
@@ -242,7 +251,7 @@ def _write_rollouts(
 
 
 @contextmanager
-def _unfinished(out: Path) -> Iterator[None]:
+def _mark_unfinished(out: Path) -> Iterator[None]:
     """Keep a file `UNFINISHED` in the folder until the block has ended without an exception."""
     out.mkdir(parents=True, exist_ok=True)
     mark = out / "UNFINISHED"
@@ -251,7 +260,7 @@ def _unfinished(out: Path) -> Iterator[None]:
     mark.unlink()
 
 
-def _to_the_end(found: Iterable[Any], ends: list[BaseException], check: Check) -> Iterator[Any]:
+def _collect_until_error(found: Iterable[Any], ends: list[BaseException], check: Check) -> Iterator[Any]:
     """Yield what is found until an exception, which is appended to `ends`, so that the data set is completed first."""
     try:
         for each in found:

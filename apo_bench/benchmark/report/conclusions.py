@@ -26,7 +26,7 @@ from apo_bench.benchmark.analysis import (
 from apo_bench.benchmark.analysis.over_seeds import PooledRate
 from apo_bench.io import format_count
 from apo_bench.records import CORRECTOR, knows_truth, uses_contacts
-from apo_bench.records.run.trials import trials_of
+from apo_bench.records.run.trials import make_trials
 
 ALIKE_WITHIN = 0.05
 """Two methods count as equal only if the whole interval of their difference lies within this around 0."""
@@ -41,19 +41,19 @@ _Who = tuple[str, int]
 """A method, and the reobservations allowed."""
 
 
-def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
+def write_answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
     """Return the sentences, with methods in backquotes.
 
     Trials with wrong contacts count only if there are no trials with the given ones.
     """
-    results, kinds = _results(records)
+    results, kinds = _collect_results(records)
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     quoted = ", ".join(f"`{kind}`" for kind in kinds)
     wrong = "" if kinds == [_GIVEN] else f" Correctors used the contacts {quoted} here, not `{_GIVEN}`."
-    best, *others = _ranked(results)
+    best, *others = _rank_methods(results)
     if not any(own.success.any() for own in results.values()):
-        counts = ", ".join(f"{_named(who)} in 0 of {len(results[who].seed):,}" for who in (best, *others))
+        counts = ", ".join(f"{_format_method(who)} in 0 of {len(results[who].seed):,}" for who in (best, *others))
         return f"No method succeeds in any trial: {counts}.{wrong}"
     own = pool_rate(results[best])
     half = [
@@ -62,17 +62,22 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
         if (h.condition.method, h.condition.max_reobservations) == best and h.condition.contact_source in kinds
     ]
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
-    reached = _reach(half) if own.seeds >= FEWEST_SEEDS else ""
-    sentences = (_counted(best, own), reached, *(_compared(best, who, results) for who in known), _few(own))
+    reached = _describe_half_level(half) if own.seeds >= FEWEST_SEEDS else ""
+    sentences = (
+        _describe_rate(best, own),
+        reached,
+        *(_describe_comparison(best, who, results) for who in known),
+        _note_few_seeds(own),
+    )
     return " ".join(filter(None, sentences)) + wrong
 
 
-def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
+def _collect_results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
     """Return the results of each method, and the contact sources of the trials that count.
 
     Only trials with the given contacts count; if there are none, those of all contact sources.
     """
-    trials = trials_of(records)
+    trials = make_trials(records)
     counts = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
     counted = trials.where(counts & ~trials.holds("method", knows_truth))
     informed = counted.holds("method", uses_contacts)
@@ -89,7 +94,7 @@ def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
     return results, kinds
 
 
-def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
+def _rank_methods(results: Mapping[_Who, Results]) -> list[_Who]:
     """Return methods with the best first, by the trials that all of them have.
 
     Methods with less than half as many trials as the largest number are left out.
@@ -106,20 +111,21 @@ def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
     return sorted(widely, key=lambda who: (-rate(who), rank_method(who[0]), who))
 
 
-def _named(who: _Who) -> str:
+def _format_method(who: _Who) -> str:
     """Format a method: `contact`, or `contact-robust` with 2 reobservations."""
     method, reobservations = who
     return f"`{method}`" + f" with {reobservations} reobservations" * (reobservations > 0)
 
 
-def _counted(who: _Who, own: PooledRate) -> str:
+def _describe_rate(who: _Who, own: PooledRate) -> str:
     """Return `contact succeeds in 95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %).`"""
     between = "" if own.seeds < FEWEST_SEEDS else f"; 95 % interval {format_percent_interval(own.interval)}"
     trials = format_count(own.trials, "trial")
-    return f"{_named(who)} succeeds in {own.right:,} of {trials} ({format_percent(own.right / own.trials)}{between})."
+    share = format_percent(own.right / own.trials)
+    return f"{_format_method(who)} succeeds in {own.right:,} of {trials} ({share}{between})."
 
 
-def _few(own: PooledRate) -> str:
+def _note_few_seeds(own: PooledRate) -> str:
     """Return a sentence if there are too few seeds for an interval, else an empty text."""
     if own.seeds >= FEWEST_SEEDS:
         return ""
@@ -127,7 +133,7 @@ def _few(own: PooledRate) -> str:
     return f"{seeds} too few for an interval: from {FEWEST_SEEDS} on, a difference at every seed is beyond chance."
 
 
-def _reach(half: Sequence[HalfLevel]) -> str:
+def _describe_half_level(half: Sequence[HalfLevel]) -> str:
     """Return a sentence on the noise level at which success falls to one half; of several settings, the worst."""
     if not half:
         return ""
@@ -141,28 +147,28 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     return f"{where} success falls to one half at noise level {worst.text} (surely: {worst.sure_text})."
 
 
-def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
+def _describe_comparison(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
     """Return a sentence that compares the counts of two methods; empty if they have no trial in common."""
     c = contrast(results[ours], results[other])
     if c is None:
         return ""
-    counted = f"{_named(other)} succeeds in {c.theirs:,} of the same {c.trials:,}"
+    counted = f"{_format_method(other)} succeeds in {c.theirs:,} of the same {c.trials:,}"
     if c.trials < len(results[ours].trial):
-        both = f"{_named(other)} succeeds in {c.theirs:,} and {_named(ours)} in {c.ours:,}"
+        both = f"{_format_method(other)} succeeds in {c.theirs:,} and {_format_method(ours)} in {c.ours:,}"
         counted = f"Of the {c.trials:,} trials that both have, {both}"
-    return f"{counted}{'' if c.seeds < FEWEST_SEEDS else f': {_told(ours, c)}'}."
+    return f"{counted}{'' if c.seeds < FEWEST_SEEDS else f': {_describe_difference(ours, c)}'}."
 
 
-def _told(ours: _Who, c: Contrast) -> str:
+def _describe_difference(ours: _Who, c: Contrast) -> str:
     """Return the conclusion from the counts of a pair: more or less often, as often, or undecided."""
     size = f"{100 * abs(c.difference):.1f} points"
     between = f"95 % interval {format_points(c.interval)}"
     if c.sure:
-        return f"{_named(ours)} succeeds {'more' if c.difference > 0 else 'less'} often, by {size} ({between})"
+        return f"{_format_method(ours)} succeeds {'more' if c.difference > 0 else 'less'} often, by {size} ({between})"
     widest = max(-c.interval.low, c.interval.high)  # the end of the interval that is farther from 0
     if widest <= ALIKE_WITHIN:
         return f"as often, to within {100 * widest:.1f} points (95 % interval of the difference)"
     if c.difference == 0.0:
         return f"as many, but {c.seeds:,} seeds leave room for a difference (in points: {between})"
-    ahead = f"{_named(ours)} is {size} {'ahead' if c.difference > 0 else 'behind'}"
+    ahead = f"{_format_method(ours)} is {size} {'ahead' if c.difference > 0 else 'behind'}"
     return f"{ahead}, which {c.seeds:,} seeds do not tell from chance ({between})"

@@ -21,25 +21,25 @@ from apo_bench.benchmark.analysis import (
     tabulate_probing,
     tabulate_timing,
 )
-from apo_bench.benchmark.report.conclusions import answer
-from apo_bench.benchmark.report.failure_choice import Draw, sample
-from apo_bench.benchmark.report.figures.figures import figures
-from apo_bench.benchmark.report.page.report_page import Contents, report_page
-from apo_bench.benchmark.report.tables.conditions import condition_table, half_table, pair_table
+from apo_bench.benchmark.report.conclusions import write_answer
+from apo_bench.benchmark.report.failure_choice import Draw, choose_failures
+from apo_bench.benchmark.report.figures.figures import draw_figures
+from apo_bench.benchmark.report.page.report_page import Contents, render_report
+from apo_bench.benchmark.report.tables.conditions import make_condition_table, make_half_level_table, make_pair_table
 from apo_bench.benchmark.report.tables.methods import (
-    calibration_table,
-    confusion_table,
-    detection_table,
-    effort_table,
-    gap_table,
-    probing_table,
-    time_table,
-    work_table,
+    make_calibration_table,
+    make_confusion_table,
+    make_detection_table,
+    make_effort_table,
+    make_gap_table,
+    make_probing_table,
+    make_time_table,
+    make_work_table,
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, has_parquet, write_file, write_parts
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_file import read_run, scenario_files
+from apo_bench.records.run.run_file import list_scenario_files, read_run
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
@@ -75,7 +75,7 @@ class Report(NamedTuple):
     """Why other failures were not drawn."""
 
 
-def report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> Report:
+def write_report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> Report:
     """Write page, tables and figures into the folder of a sweep; no code that its records name is imported.
 
     Args:
@@ -98,32 +98,32 @@ def report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> R
         for name in (TABLES, FIGURES):
             require(not (folder / name).is_symlink(), f"{folder / name} is a symbolic link; remove it.")
             (folder / name).mkdir(exist_ok=True)
-        return _write(folder, trials, numbers, sample(trials, pictures), draw)
+        return _write_files(folder, trials, numbers, choose_failures(trials, pictures), draw)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _write(
+def _write_files(
     folder: Path, trials: Trials, numbers: Summary, failures: Sequence[TrialRecord], draw: Draw | None
 ) -> Report:
     """Compute all tables and figures, and write them."""
     run = read_run(folder)
     times, work = tabulate_timing(read_timing(folder))
     tables = {
-        "conditions": condition_table(numbers.results),
-        "pairs": pair_table(numbers.pairs),
-        "half_levels": half_table(numbers.half_levels),
-        "gaps": gap_table(tabulate_gaps(trials)),
-        "confusion": confusion_table(tabulate_confusion(trials)),
-        "detected": detection_table(tabulate_detection(trials)),
-        "calibration": calibration_table(tabulate_calibration(trials)),
-        "probing": probing_table(tabulate_probing(trials)),
-        "effort": effort_table(tabulate_effort(trials)),
-        "times": time_table(times),
-        "work": work_table(work),
+        "conditions": make_condition_table(numbers.results),
+        "pairs": make_pair_table(numbers.pairs),
+        "half_levels": make_half_level_table(numbers.half_levels),
+        "gaps": make_gap_table(tabulate_gaps(trials)),
+        "confusion": make_confusion_table(tabulate_confusion(trials)),
+        "detected": make_detection_table(tabulate_detection(trials)),
+        "calibration": make_calibration_table(tabulate_calibration(trials)),
+        "probing": make_probing_table(tabulate_probing(trials)),
+        "effort": make_effort_table(tabulate_effort(trials)),
+        "times": make_time_table(times),
+        "work": make_work_table(work),
     }
     lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))  # for the figures
-    drawn = figures(numbers.results, numbers.pairs, list_settings(numbers.results), *lines)
+    drawn = draw_figures(numbers.results, numbers.pairs, list_settings(numbers.results), *lines)
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
     kept = [path for paths in written.values() for path in paths]
@@ -132,9 +132,9 @@ def _write(
     paths = [figure.write(folder / FIGURES / f"{name}.svg") for name, figure in drawn.items()]
     small = [name for name in PNG if name in drawn and drawn[name].panels <= MOST_PANELS]
     paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
-    pictures, no_pictures = draw(failures, folder, scenario_files(run)) if draw else ([], [])
-    sentences = answer(trials, numbers.half_levels)
-    html = report_page(
+    pictures, no_pictures = draw(failures, folder, list_scenario_files(run)) if draw else ([], [])
+    sentences = write_answer(trials, numbers.half_levels)
+    html = render_report(
         Contents(
             name=folder.resolve().name,
             answer=sentences,

@@ -12,7 +12,7 @@ _LONG = 400
 _SHARED = ("schema", "fidelity", "grasp", "arm", "timestep_s", "clearance_mm")  # settings that a report states once
 
 
-def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> dict[str, Table]:
+def list_run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> dict[str, Table]:
     """Return tables of names and values by their headings; empty ones are left out."""
     seeds = trials.number("seed")
     tables: dict[str, Mapping[str, Any]] = {
@@ -29,13 +29,13 @@ def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> d
     }
     columns = (TableColumn("", "name", "name", words=True), TableColumn("", "value", "value", words=True))
     return {
-        heading: Table([{"name": name, "value": value_words(x)} for name, x in values.items()], columns)
+        heading: Table([{"name": name, "value": format_setting(x)} for name, x in values.items()], columns)
         for heading, values in tables.items()
         if values
     }
 
 
-def value_words(value: Any) -> str:
+def format_setting(value: Any) -> str:
     """Format a value for people: lists with commas, other values as JSON; long ones are cut."""
     text = value if isinstance(value, str) else json.dumps(value)
     if isinstance(value, list | tuple) and not any(isinstance(x, dict | list) for x in value):

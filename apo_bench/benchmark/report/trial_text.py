@@ -24,7 +24,7 @@ NUMBERS: Mapping[str, str] = {
 """Column of a record -> its name on a page, in the order of the page."""
 
 
-def verdict(row: Mapping[str, Any]) -> str:
+def describe_verdict(row: Mapping[str, Any]) -> str:
     """Return the verdict on a trial in a few words."""
     if row["success"] is None:
         return "excluded"
@@ -33,7 +33,7 @@ def verdict(row: Mapping[str, Any]) -> str:
     return "loosely right" if row["loose_success"] else "failed"
 
 
-def why(row: Mapping[str, Any]) -> str:
+def describe_failure(row: Mapping[str, Any]) -> str:
     """Return stage, code and operation of a failure: `attach: force_stop, operation 3`; empty without a failure."""
     if row["failure_stage"] is None:
         return ""
@@ -41,7 +41,7 @@ def why(row: Mapping[str, Any]) -> str:
     return f"{row['failure_stage']}: {row['failure_code']}{where}"
 
 
-def predicted(row: Mapping[str, Any]) -> str:
+def describe_prediction(row: Mapping[str, Any]) -> str:
     """Return the failure prediction of a plan in words; empty without a plan."""
     if row["predicted_fails"] is None:
         return ""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.analysis import MeanEstimate, format_signed, pool_estimates
-from apo_bench.benchmark.analysis.paired import holm
+from apo_bench.benchmark.analysis.paired import adjust_by_holm
 from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.benchmark.scoring.entry import Entry, TrackScore, compare_entries, read_entry
 from apo_bench.benchmark.scoring.track import read_track, track_names
@@ -91,7 +91,7 @@ def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset())
         whole = pool_estimates(those) if scores[id(entry)] and those and counting <= found.keys() else None
         verified = _is_verified(entry, secret_seeds)
         lines.append(Line(i, entry, verified, scores[id(entry)], found, whole, None))
-    p = holm({line.place: line.difference.p for line in lines if line.difference is not None})
+    p = adjust_by_holm({line.place: line.difference.p for line in lines if line.difference is not None})
     return [line._replace(p=p.get(line.place)) for line in lines]
 
 

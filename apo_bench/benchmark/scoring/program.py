@@ -23,7 +23,7 @@ import numpy as np
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.formats.json_forms import PoseForm
-from apo_bench.formats.observation_json import observation_form
+from apo_bench.formats.observation_json import make_observation_form
 from apo_bench.geometry import Array, Face, RoundFace
 from apo_bench.io import FileTable, convert_typed, decode_text, parse_plain, write_file
 from apo_bench.names import own_modules_in
@@ -121,7 +121,7 @@ def request_line(observation: Observation) -> str:
 def _request_form(observation: Observation) -> dict[str, Any]:
     """Return a request without its `id`: an observation as in files, with contacts and faces instead of a scenario."""
     assembly = observation.assembly
-    form = observation_form(observation, "")
+    form = make_observation_form(observation, "")
     del form["scenario"]
     for entry, operation in zip(form["operations"], assembly.operations, strict=True):
         entry["carries"] = list(operation.carries)

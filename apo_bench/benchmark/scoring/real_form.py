@@ -14,7 +14,7 @@ from apo_bench.formats.kit import FORM_COLUMNS
 from apo_bench.io import CsvRow, read_bytes, read_csv
 from apo_bench.records import Criteria
 from apo_bench.scenario import load_scenario
-from apo_bench.trial.fingerprint import git_revision
+from apo_bench.trial.fingerprint import find_git_revision
 
 _HEX = 16  # digits of a hash
 _LARGEST_MM = 1000.0  # largest length in a form
@@ -109,7 +109,7 @@ def _entry(
         command=command,
         quick=False,
         versions={"apo_bench": __version__},
-        revision=git_revision(),
+        revision=find_git_revision(),
         machine="real robot",
         tracks=tracks,
         real=True,

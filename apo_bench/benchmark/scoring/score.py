@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.analysis.rates import brier_score, mean, measure_reliability, was_executed
+from apo_bench.benchmark.analysis.rates import compute_brier_score, compute_mean, measure_reliability, was_executed
 from apo_bench.benchmark.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.benchmark.scoring.track import Track
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.io import clean, group_by, shorten_text
 from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.trials import trials_of
-from apo_bench.trial.fingerprint import git_revision
+from apo_bench.records.run.trials import make_trials
+from apo_bench.trial.fingerprint import find_git_revision
 
 _HEX = 16  # digits of a hash
 
@@ -77,7 +77,7 @@ def score(
         command=shorten_text(clean(command)),
         quick=quick,
         versions=dict(sorted(versions.items())),
-        revision=git_revision(),
+        revision=find_git_revision(),
         machine=platform.platform(),
         tracks=scores,
     )
@@ -87,7 +87,7 @@ def _score_track(
     track: Track, conditions: Mapping[str, str], records: Sequence[TrialRecord], run: Mapping[str, Any]
 ) -> TrackScore:
     """Score a track from the records with all of its arms."""
-    trials = trials_of(records)
+    trials = make_trials(records)
     counted = trials.where(~np.isnan(trials.number("success")))
     value, low, high = score_of(conditions)
     return TrackScore(
@@ -98,8 +98,8 @@ def _score_track(
         high=high,
         trials=len(counted),
         executed=int(was_executed(counted).sum()),
-        predicted_success=mean(counted.number("predicted_success")),
-        brier=brier_score(counted),
+        predicted_success=compute_mean(counted.number("predicted_success")),
+        brier=compute_brier_score(counted),
         reliability=measure_reliability(counted),
         records=_digest(sorted(json.dumps(record, sort_keys=True) for record in records)),
         code=_digest([json.dumps({key: run[key] for key in ("versions", "content")}, sort_keys=True)]),

@@ -20,7 +20,7 @@ from typing import Any
 from pebble import ProcessPool
 
 from apo_bench.benchmark.sweeps.grid import Batch
-from apo_bench.benchmark.sweeps.pool import THREADS, Emit, process_pool, run_in_pool
+from apo_bench.benchmark.sweeps.pool import THREADS, Emit, make_process_pool, run_in_pool
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs
 from apo_bench.errors import InputError, require
 from apo_bench.io import set_environment
@@ -97,7 +97,7 @@ def run_on_cluster(
     import ray
     from ray.exceptions import RayError, RayTaskError
 
-    _join(address, workers, files)
+    _join_cluster(address, workers, files)
     task = ray.remote(num_cpus=1)(run_on_node)
     at_once = workers or _AHEAD * int(ray.cluster_resources().get("CPU", 1))
     inputs_there = ray.put(inputs)
@@ -142,17 +142,17 @@ def run_on_node(batches: Sequence[Batch], inputs: SweepInputs, limit_s: float) -
     node = {"node": ray.get_runtime_context().get_node_id()}
     ended: list[Ended] = []
     start = time.perf_counter()
-    run_in_pool(_pool_of_node(), batches, inputs, 1, limit_s, lambda record, wall: ended.append((record, wall | node)))
+    run_in_pool(_get_node_pool(), batches, inputs, 1, limit_s, lambda record, wall: ended.append((record, wall | node)))
     return ended, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)
-def _pool_of_node() -> ProcessPool:
+def _get_node_pool() -> ProcessPool:
     """Return the pool of one process that serves a CPU of a node; Ray reuses its worker processes for later tasks."""
-    return _POOLS.enter_context(process_pool(1))
+    return _POOLS.enter_context(make_process_pool(1))
 
 
-def _join(address: str | None, workers: int | None, files: Mapping[str, Path]) -> None:
+def _join_cluster(address: str | None, workers: int | None, files: Mapping[str, Path]) -> None:
     """Join the named cluster, or the one on this machine, or one that is started for the duration of the sweep.
 
     Raises:

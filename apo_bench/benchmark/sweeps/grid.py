@@ -52,7 +52,7 @@ _FIRST = ("scenario", "noise_level", "human_error_scale", "method")
 """The settings that may be positional arguments."""
 
 
-def _axis_fields() -> Iterator[tuple[str, Any, Any]]:
+def _list_axis_fields() -> Iterator[tuple[str, Any, Any]]:
     """Yield name, type and field of each setting that a sweep may vary, then of each that its trials share."""
     for info in sorted(AXES, key=lambda info: _FIRST.index(info.name) if info.name in _FIRST else len(_FIRST)):
         default = () if info.name in _MAY_BE_EMPTY else info.swept or (info.default,)
@@ -61,7 +61,7 @@ def _axis_fields() -> Iterator[tuple[str, Any, Any]]:
         yield name, Any, field(default=SETTINGS[name].default, kw_only=True)
 
 
-_Axes: Any = make_dataclass("_Axes", _axis_fields(), frozen=True)
+_Axes: Any = make_dataclass("_Axes", _list_axis_fields(), frozen=True)
 """Base class with one field for each setting that a sweep may vary, and for each that its trials share."""
 
 
@@ -102,13 +102,13 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     def __post_init__(self) -> None:
         if self.noise_mm != () or self.noise_deg != ():
             # one of the two may be missing
-            by_axis = [as_tuple(values) or (1.0,) for values in (self.noise_mm, self.noise_deg)]
+            by_axis = [convert_to_tuple(values) or (1.0,) for values in (self.noise_mm, self.noise_deg)]
             object.__setattr__(self, "noise_level", tuple(product(*by_axis)))
             object.__setattr__(self, "noise_mm", ())
             object.__setattr__(self, "noise_deg", ())
         for info in AXES:
-            given = as_tuple(getattr(self, info.name))
-            entries = given if info.is_whole else map(_plain, given)
+            given = convert_to_tuple(getattr(self, info.name))
+            entries = given if info.is_whole else map(_to_plain, given)
             values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
             require(
                 values or info.name in _MAY_BE_EMPTY,
@@ -137,18 +137,18 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
         check_grip(any(map(probes, self.method)), *self.grasp)
 
 
-def as_tuple(values: Any) -> tuple[Any, ...]:
+def convert_to_tuple(values: Any) -> tuple[Any, ...]:
     """Return one value or several as a tuple: a text is one value, and a list within a list becomes a pair."""
     several = values if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
     return tuple(tuple(each) if isinstance(each, list) else each for each in several)
 
 
-def _plain(value: Any) -> Any:
+def _to_plain(value: Any) -> Any:
     """Convert numbers to floats as in records: 2.0 for 2, and 0.0 for -0.0; other values stay."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value) + 0.0
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return tuple(map(_plain, value))
+        return tuple(map(_to_plain, value))
     return value
 
 
@@ -198,7 +198,7 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(
+def list_work_units(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None = None
 ) -> Iterator[Batch]:
     """Yield all trials of a sweep, each once, in batches ordered by seed, or by the number of the trial.
@@ -222,7 +222,7 @@ def units(
                 for grid in those
                 if source in grid.scenario
                 for clearance_mm in grid.clearance_mm or (scenario.clearance_mm,)
-                for trial in _trials(grid, same | {"clearance_mm": clearance_mm})
+                for trial in _list_trials(grid, same | {"clearance_mm": clearance_mm})
             )
             # without trials that several grids share
             yield from (tuple(dict.fromkeys(trials)) for trials in together.values())
@@ -272,7 +272,7 @@ def _independent_units(
                 same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
                 clearances = one.clearance_mm or (loaded[source].clearance_mm,)
                 if trial < one.trials:
-                    batch |= dict.fromkeys(_trials(one, same | {"clearance_mm": clearances[0]}))
+                    batch |= dict.fromkeys(_list_trials(one, same | {"clearance_mm": clearances[0]}))
             if batch:
                 yield tuple(batch)
 
@@ -309,7 +309,7 @@ def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario])
     return forms
 
 
-def _trials(grid: SweepConfig, same: Mapping[str, Any]) -> Iterator[TrialConfig]:
+def _list_trials(grid: SweepConfig, same: Mapping[str, Any]) -> Iterator[TrialConfig]:
     """Yield every combination of a grid; settings that do not affect the method have their defaults.
 
     Args:

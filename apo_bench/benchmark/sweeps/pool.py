@@ -20,7 +20,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from apo_bench.benchmark.sweeps.grid import Batch
 from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
-from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
+from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, make_timing
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, set_environment
 from apo_bench.names import add_own_modules, folder_of_own_modules
@@ -50,13 +50,13 @@ def check_limit(limit_s: float) -> None:
 
 
 @contextmanager
-def process_pool(workers: int) -> Iterator[ProcessPool]:
+def make_process_pool(workers: int) -> Iterator[ProcessPool]:
     """Start processes that have imported what trials need; they are stopped at the end of the context."""
     spawn: Any = multiprocessing.get_context("spawn")  # forked processes would share state
     pool = ProcessPool(workers, _MOST_BATCHES, prepare_process, [folder_of_own_modules()], spawn)
     with set_environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
         try:
-            _start(pool)
+            _start_pool(pool)
             yield pool
         except BrokenProcessPool as error:
             raise RuntimeError(
@@ -75,7 +75,7 @@ def run_locally(batches: Sequence[Batch], inputs: SweepInputs, workers: int, lim
         InputError: A worker found that the settings or files do not allow a trial.
         RuntimeError: A trial could not be run, or processes end before they have begun one.
     """
-    with process_pool(min(workers, len(batches))) as pool:
+    with make_process_pool(min(workers, len(batches))) as pool:
         run_in_pool(pool, batches, inputs, workers, limit_s, emit)
 
 
@@ -90,10 +90,12 @@ def run_in_pool(
             batch = waiting.popleft()
             running[pool.schedule(_run_batch, [batch, inputs], timeout=limit_s)] = batch
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            waiting.extendleft(_take(future, running.pop(future), inputs, emit))  # trials of a failed batch come first
+            waiting.extendleft(
+                _take_results(future, running.pop(future), inputs, emit)
+            )  # trials of a failed batch come first
 
 
-def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: Emit) -> list[Batch]:
+def _take_results(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: Emit) -> list[Batch]:
     """Emit the results of a batch, and return the batches that replace it if its process died or was too slow."""
     try:
         for record, wall in future.result():
@@ -103,8 +105,8 @@ def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: 
         if len(batch) > 1:
             return [(trial,) for trial in batch]
         (trial,) = batch
-        record = record_lost_trial(trial, inputs.content[trial.scenario], _code_of(error))
-        emit(record, timing(record, None, None, None, {"worker": getattr(error, "pid", None)}))
+        record = record_lost_trial(trial, inputs.content[trial.scenario], _get_failure_code(error))
+        emit(record, make_timing(record, None, None, None, {"worker": getattr(error, "pid", None)}))
         return []
 
 
@@ -118,12 +120,12 @@ def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
     """
     scenario, settings = checked_request(request)
     check_limit(limit_s)
-    with stop_at_signals(), process_pool(1) as pool:
+    with stop_at_signals(), make_process_pool(1) as pool:
         try:
             record: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
             return record
         except (ProcessExpired, TimeoutError) as error:
-            return record_lost_request(request, settings, scenario, _code_of(error))
+            return record_lost_request(request, settings, scenario, _get_failure_code(error))
 
 
 def prepare_process(folder: str) -> None:
@@ -138,7 +140,7 @@ def prepare_process(folder: str) -> None:
     add_own_modules(folder)
 
 
-def _start(pool: ProcessPool) -> None:
+def _start_pool(pool: ProcessPool) -> None:
     """Start the processes of a pool with SIGINT blocked, since the parent process handles Ctrl-C and ends them."""
     if hasattr(signal, "pthread_sigmask"):
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
@@ -146,7 +148,7 @@ def _start(pool: ProcessPool) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _code_of(error: Exception) -> str:
+def _get_failure_code(error: Exception) -> str:
     return "time_limit" if isinstance(error, TimeoutError) else "worker_died"
 
 

@@ -14,10 +14,10 @@ EVERY_S = 60.0
 
 
 @contextmanager
-def progress(total: int) -> Iterator[Count]:
+def show_progress(total: int) -> Iterator[Count]:
     """Show how many of `total` trials are finished, and how long the others will take."""
     if not sys.stderr.isatty() or total == 0:
-        yield _lines(total)
+        yield _show_lines(total)
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
@@ -28,7 +28,7 @@ def progress(total: int) -> Iterator[Count]:
         yield lambda: bar.advance(task)
 
 
-def _lines(total: int) -> Count:
+def _show_lines(total: int) -> Count:
     """Return a counter that prints a line at the start, then every minute the progress and the remaining time."""
     if total:
         sys.stderr.write(f"0 of {total} trials\n")

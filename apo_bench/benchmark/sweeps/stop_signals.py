@@ -8,14 +8,14 @@ from types import FrameType
 from typing import Any, final
 
 Check = Callable[[], None]
-"""Raises `Stopped` if a signal has arrived."""
+"""Raises `StoppedBySignal` if a signal has arrived."""
 # where there is no SIGHUP, SIGTERM stands twice
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 _USUAL = (signal.SIG_DFL, signal.default_int_handler)  # handlers that may be replaced
 
 
 @final
-class Stopped(KeyboardInterrupt):
+class StoppedBySignal(KeyboardInterrupt):
     """A signal asked this process to stop; `number` is that of the signal."""
 
     def __init__(self, number: int) -> None:
@@ -25,21 +25,22 @@ class Stopped(KeyboardInterrupt):
 
 @contextmanager
 def stop_at_signals(patience: int = 0) -> Iterator[Check]:
-    """Raise `Stopped` when a signal arrives; signals that the caller handles or ignores are left alone.
+    """Raise `StoppedBySignal` when a signal arrives; signals that the caller handles or ignores are left alone.
 
     Args:
-        patience: Number of signals that raise nothing at once; the yielded function raises `Stopped` after any of them.
+        patience: Number of signals that raise nothing at once; the yielded function raises `StoppedBySignal` after any
+            of them.
     """
     came: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
         if len(came) > patience:
-            raise Stopped(number)
+            raise StoppedBySignal(number)
 
     def check() -> None:
         if came:
-            raise Stopped(came[0])
+            raise StoppedBySignal(came[0])
 
     # only the main thread may set handlers
     signals = _SIGNALS if threading.current_thread() is threading.main_thread() else ()
@@ -50,7 +51,7 @@ def stop_at_signals(patience: int = 0) -> Iterator[Check]:
         yield check
     except KeyboardInterrupt as error:
         # Ray raises a plain KeyboardInterrupt
-        raise Stopped(came[0] if came else signal.SIGINT) from error
+        raise StoppedBySignal(came[0] if came else signal.SIGINT) from error
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, describe_grids, load_all, units
+from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, describe_grids, list_work_units, load_all
 from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
-from apo_bench.benchmark.sweeps.progress import progress
+from apo_bench.benchmark.sweeps.progress import show_progress
 from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
 from apo_bench.correction.correctors import resolve_corrector
@@ -28,13 +28,13 @@ from apo_bench.records import (
     parse_noise_level,
     resolve_simulated,
 )
-from apo_bench.records.run.run_file import run_record
+from apo_bench.records.run.run_file import make_run_record
 from apo_bench.records.run.run_folder import RunFolder, read_records
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
-from apo_bench.trial.fingerprint import config_hash, content_hash, git_revision, versions
-from apo_bench.trial.input_files import content_pieces, noise_content, own_content
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash, find_git_revision, list_versions
+from apo_bench.trial.input_files import hash_input_files, hash_noise_files, hash_user_code
 
 _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
@@ -102,23 +102,23 @@ def run_sweep(
     physics(grids[0].timestep_s)  # raises if the time step is not allowed
     arm_name = grids[0].arm
     arm = find_arm(arm_name)
-    content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
-    inputs = SweepInputs(content, versions())
+    content = {source: compute_content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
+    inputs = SweepInputs(content, list_versions())
     secret_seed = None if secret_seed_file is None else open_secret_seed(secret_seed_file, out)
     here = workers is None and backend == "local"  # in this process
-    run = run_record(
+    run = make_run_record(
         describe_grids(grids, loaded),
-        _content(grids, loaded, arm.files),
+        _hash_content(grids, loaded, arm.files),
         inputs.versions,
         {loaded[source].name: source for source in loaded if not is_named(source)},
         command,
         secret_seed,
         Limits(None if here else limit_s),
-        git_revision(),
+        find_git_revision(),
     )
     with stop_at_signals(), RunFolder(Path(out), run) as store:
-        batches = list(_left(units(grids, loaded, secret_seed), loaded, inputs, store))
-        with progress(sum(map(len, batches))) as count:
+        batches = list(_list_remaining_batches(list_work_units(grids, loaded, secret_seed), loaded, inputs, store))
+        with show_progress(sum(map(len, batches))) as count:
 
             def emit(record: TrialRecord, timing: Timing) -> None:
                 store.append(record, timing)
@@ -133,15 +133,20 @@ def run_sweep(
                 run_locally(batches, inputs, workers or 1, limit_s, emit)
             else:
                 from apo_bench.benchmark.sweeps.cluster import run_on_cluster
-                from apo_bench.benchmark.sweeps.user_files import travelling_files
+                from apo_bench.benchmark.sweeps.user_files import list_user_files_for_nodes
 
-                names = (*_names(grids, "method"), *_names(grids, "noise"), *_names(grids, "contact_source"), arm_name)
-                files = travelling_files(loaded, arm.files, names)
+                names = (
+                    *_list_names(grids, "method"),
+                    *_list_names(grids, "noise"),
+                    *_list_names(grids, "contact_source"),
+                    arm_name,
+                )
+                files = list_user_files_for_nodes(loaded, arm.files, names)
                 run_on_cluster(batches, inputs, workers, limit_s, emit, address, files)
         return read_records(out)
 
 
-def _left(
+def _list_remaining_batches(
     work: Iterable[Batch], loaded: Mapping[str, Scenario], inputs: SweepInputs, store: RunFolder
 ) -> Iterator[Batch]:
     """Yield batches of the trials without a record.
@@ -158,7 +163,7 @@ def _left(
             if found is None:
                 left.append(trial)
             elif cell not in hashes:
-                hashes[cell] = config_hash(trial, inputs.content[trial.scenario])
+                hashes[cell] = compute_config_hash(trial, inputs.content[trial.scenario])
             require(
                 found is None or found == hashes[cell],
                 f"'{store.folder}' holds a record of {loaded[trial.scenario].name}, method {trial.method}, seed "
@@ -202,24 +207,24 @@ def _check_names(grids: Sequence[SweepConfig]) -> None:
                 resolve_corrector(resolve_simulated(corrector))
 
 
-def _names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:
+def _list_names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:
     """Return the values of all grids for a setting, each once."""
     return tuple(dict.fromkeys(name for grid in grids for name in getattr(grid, axis)))
 
 
-def _content(
+def _hash_content(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], arm_files: tuple[Path, ...]
 ) -> dict[str, str]:
     """Return input -> hash for each file and plugin of the trials, so that a message can name what changed."""
     pieces = {
         f"{scenario.name}, {piece}": hashed
         for source, scenario in loaded.items()
-        for piece, hashed in content_pieces(scenario, source, arm_files).items()
+        for piece, hashed in hash_input_files(scenario, source, arm_files).items()
     }
     return {
         **pieces,
-        **noise_content(*_names(grids, "noise")),
-        **own_content("contact_source", *_names(grids, "contact_source")),
-        **own_content("method", *_names(grids, "method")),
-        **own_content("arm", grids[0].arm),
+        **hash_noise_files(*_list_names(grids, "noise")),
+        **hash_user_code("contact_source", *_list_names(grids, "contact_source")),
+        **hash_user_code("method", *_list_names(grids, "method")),
+        **hash_user_code("arm", grids[0].arm),
     }

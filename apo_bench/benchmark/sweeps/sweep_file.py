@@ -20,7 +20,7 @@ import msgspec
 from msgspec import UNSET
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, as_tuple
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, convert_to_tuple
 from apo_bench.errors import InputError
 from apo_bench.io import FileTable, Positive, convert_typed, read_plain
 from apo_bench.records import SETTINGS, convert_to_python_units
@@ -73,14 +73,14 @@ def read_sweep(
     """
     keys = {key: value for key, value in read_plain(path, "sweep file").items() if key not in besides}
     top: Any = convert_typed(keys, SweepTable, str(path))
-    first = _values(top)
+    first = _read_values(top)
     grids = {str(path): first}
     for i, table in enumerate(top.also, start=1):
-        grids[f"{path}, also {i}"] = first | _values(table)  # missing keys are those of the first grid
-    return tuple(_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
+        grids[f"{path}, also {i}"] = first | _read_values(table)  # missing keys are those of the first grid
+    return tuple(_make_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
 
 
-def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
+def _make_grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
     """Make a grid from its values; errors name the place in the file."""
     try:
         return SweepConfig(**convert_to_python_units(values))
@@ -88,7 +88,9 @@ def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
         raise InputError(f"{name}: {error}") from error
 
 
-def _values(table: msgspec.Struct) -> dict[str, Any]:
+def _read_values(table: msgspec.Struct) -> dict[str, Any]:
     """Return the keys that a table states, with their values."""
     stated = {key: value for key, value in msgspec.structs.asdict(table).items() if value is not UNSET}
-    return {key: as_tuple(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"}
+    return {
+        key: convert_to_tuple(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"
+    }

@@ -7,10 +7,10 @@ from pathlib import Path
 from apo_bench.perception.observation.noise_file import find_noise_path
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.scenario.parts import read_part
-from apo_bench.trial.input_files import own_files
+from apo_bench.trial.input_files import list_user_files
 
 
-def travelling_files(
+def list_user_files_for_nodes(
     loaded: Mapping[str, Scenario], arm_files: Iterable[Path], names: Iterable[str]
 ) -> dict[str, Path]:
     """Return the needed files below the current folder: relative path -> file. Files elsewhere are not copied.
@@ -31,7 +31,7 @@ def travelling_files(
                 files.extend(read_part(part).files)
     for name in names:
         noise = find_noise_path(name)
-        files.extend(own_files(name) if noise is None else (noise,))
+        files.extend(list_user_files(name) if noise is None else (noise,))
     here = Path.cwd()
     whole = [Path(os.path.normpath(here / path)) for path in files]
     return {path.relative_to(here).as_posix(): path for path in whole if path.is_relative_to(here)}

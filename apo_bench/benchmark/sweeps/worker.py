@@ -11,7 +11,7 @@ from apo_bench.errors import require
 from apo_bench.records import KEY, TrialConfig, TrialRecord, get_record_key
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fingerprint import content_hash, versions
+from apo_bench.trial.fingerprint import compute_content_hash, list_versions
 from apo_bench.trial.run import record_trial
 from apo_bench.trial.trial_stages import demonstration_of, scene_key, scene_of
 
@@ -26,7 +26,7 @@ class SweepInputs:
     """Hashes and versions that the records of a sweep state, as found by the process that started it."""
 
     content: Mapping[str, str]
-    """Name or path of a scenario -> its `content_hash`."""
+    """Name or path of a scenario -> its `compute_content_hash`."""
     versions: Mapping[str, str]
     """Package -> version."""
 
@@ -45,7 +45,7 @@ class Worker:
         Raises:
             InputError: Other versions of packages are installed here.
         """
-        here = versions()
+        here = list_versions()
         for package, version in inputs.versions.items():
             require(
                 here.get(package) == version,
@@ -66,21 +66,22 @@ class Worker:
         simulated = None
         for spec in batch:
             start = time.perf_counter()
-            scene = self._scene(spec)
+            scene = self._get_scene(spec)
             compiled = time.perf_counter()
             simulated = simulated or demonstration_of(spec, scene)
             shown = time.perf_counter()
             record = record_trial(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
             ended = time.perf_counter()
-            yield record, timing(record, compiled - start, shown - compiled, ended - shown, self._name)
+            yield record, make_timing(record, compiled - start, shown - compiled, ended - shown, self._name)
 
-    def _scene(self, spec: TrialConfig) -> Scene:
+    def _get_scene(self, spec: TrialConfig) -> Scene:
         """Return the compiled scene of a trial; its files must be those of the process that started the sweep."""
         key = scene_key(spec)
         if key not in self._scenes:
             scene = scene_of(spec)
             require(
-                content_hash(scene.scenario, spec.scenario, scene.arm.files) == self._inputs.content[spec.scenario],
+                compute_content_hash(scene.scenario, spec.scenario, scene.arm.files)
+                == self._inputs.content[spec.scenario],
                 f"a worker on '{platform.node()}' has other files for '{spec.scenario}' than the process "
                 "that started the sweep; install the same everywhere, or start the same command again if a file was "
                 "changed.",
@@ -89,7 +90,7 @@ class Worker:
         return self._scenes[key]
 
 
-def timing(
+def make_timing(
     record: TrialRecord,
     compile_s: float | None,
     demonstrate_s: float | None,

@@ -19,7 +19,14 @@ from apo_bench.cli.shared.completion import complete_last_word
 from apo_bench.cli.shared.cores import count_cores
 from apo_bench.cli.shared.help import GROUPS, OPTIONS, Command, Group, Interruption, make_group
 from apo_bench.cli.shared.outputs import check_output, name_write_errors
-from apo_bench.cli.shared.printing import make_console, print_columns, print_json, print_table, print_written, say
+from apo_bench.cli.shared.printing import (
+    make_console,
+    print_columns,
+    print_json,
+    print_table,
+    print_text,
+    print_written,
+)
 from apo_bench.cli.shared.setting_options import (
     add_options,
     format_default,
@@ -63,7 +70,7 @@ __all__ = (
     "print_columns",
     "print_json",
     "print_table",
+    "print_text",
     "print_written",
     "read_axis",
-    "say",
 )

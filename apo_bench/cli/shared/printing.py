@@ -16,7 +16,7 @@ def print_json(form: Any) -> None:
     typer.echo(json.dumps(form, allow_nan=False))
 
 
-def say(text: str, as_json: bool) -> None:
+def print_text(text: str, as_json: bool) -> None:
     """Print a text for people, unless the command prints a JSON object only."""
     if not as_json:
         typer.echo(text)
@@ -25,7 +25,7 @@ def say(text: str, as_json: bool) -> None:
 def print_written(*paths: Path | None, as_json: bool = False) -> None:
     """Print the names of written files, unless the command prints a JSON object only."""
     if any(paths):
-        say("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None), as_json)
+        print_text("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None), as_json)
 
 
 def print_columns(lines: Iterable[Sequence[str]]) -> None:

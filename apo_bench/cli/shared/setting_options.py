@@ -11,7 +11,7 @@ from apo_bench.cli.shared.arguments import make_path_option
 from apo_bench.cli.shared.completion import complete_last_word
 from apo_bench.cli.shared.values import parse_list
 from apo_bench.records import NOISE_LEVEL, SETTINGS, SettingInfo
-from apo_bench.records.run.replay_command import milli, number
+from apo_bench.records.run.replay_command import format_number, round_up_to_ms
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
@@ -33,7 +33,7 @@ def add_options(options: Iterable[Parameter]) -> Callable[[Command], Command]:
 def make_trial_options(*names: str) -> list[Parameter]:
     """Return the options of one trial for these settings, or for all; each option may be omitted."""
     infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
-    return [_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
+    return [_make_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
 
 
 def make_sweep_options() -> list[Parameter]:
@@ -42,8 +42,8 @@ def make_sweep_options() -> list[Parameter]:
     axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
     shared = [info for info in SETTINGS.values() if info.shared]
     return [
-        *map(_axis_option, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
-        *map(_trial_option, shared),
+        *map(_make_axis_option, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
+        *map(_make_trial_option, shared),
     ]
 
 
@@ -55,34 +55,34 @@ def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
 
 def format_default(info: SettingInfo) -> str:
     """Return the default of a setting as text, in the unit of its option."""
-    return info.usual or _in_option_unit(info, info.default)
+    return info.usual or _convert_to_option_unit(info, info.default)
 
 
-def _trial_option(info: SettingInfo) -> Parameter:
+def _make_trial_option(info: SettingInfo) -> Parameter:
     """Return the option of a setting of one trial, which takes one value."""
     description = f"{info.help}; default: {format_default(info)}."
     if info.name == "secret_seed":
-        return _parameter(info, Path, make_path_option(description))
-    return _parameter(info, getattr(info.kind, "__origin__", info.kind), _option(info, description))
+        return _make_parameter(info, Path, make_path_option(description))
+    return _make_parameter(info, getattr(info.kind, "__origin__", info.kind), _make_option(info, description))
 
 
-def _axis_option(info: SettingInfo) -> Parameter:
+def _make_axis_option(info: SettingInfo) -> Parameter:
     """Return the option of a setting of a sweep, which takes several values separated by commas."""
-    usual = ",".join(_in_option_unit(info, value) for value in info.swept) or format_default(info)
-    return _parameter(info, str, _option(info, f"{info.help}; several with commas; default: {usual}."))
+    usual = ",".join(_convert_to_option_unit(info, value) for value in info.swept) or format_default(info)
+    return _make_parameter(info, str, _make_option(info, f"{info.help}; several with commas; default: {usual}."))
 
 
-def _option(info: SettingInfo, description: str) -> Any:
+def _make_option(info: SettingInfo, description: str) -> Any:
     """Return the typer option of a setting, with completion if its values are names."""
     named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
     return typer.Option(help=description, autocompletion=complete_last_word(info.name) if named else None)
 
 
-def _parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:
+def _make_parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:
     """Return a setting as a keyword-only parameter of a command, with default None."""
     annotation = Annotated[kind | None, option]
     return Parameter(info.keyword, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-def _in_option_unit(info: SettingInfo, value: Any) -> str:
-    return str(value) if info.is_text else number(milli(value) if info.scale != 1.0 else value)
+def _convert_to_option_unit(info: SettingInfo, value: Any) -> str:
+    return str(value) if info.is_text else format_number(round_up_to_ms(value) if info.scale != 1.0 else value)

@@ -13,7 +13,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, linearise_den
 from apo_bench.geometry import Array, compute_exp_and_jacobian
 
 SURE = 1e-6
-"""`sure` of `gauss_newton.settles` for dense matrices."""
+"""`count_sure_levels` of `gauss_newton.settles` for dense matrices."""
 NEXT = 1e-9
 """`following` of `gauss_newton.settles` for dense matrices."""
 Rows = NDArray[np.intp]
@@ -35,7 +35,7 @@ class LinearStep(Protocol):
     """(3, b): the largest |e|, [m]; the mean square of e of the equations that must hold; the mean square of the rows
     of J."""
     settled: tuple[float, float]
-    """`sure` and `following` of `gauss_newton.settles`."""
+    """`count_sure_levels` and `following` of `gauss_newton.settles`."""
 
     @property
     def Jt(self) -> Any:

@@ -12,9 +12,9 @@ from apo_bench.assembly import Contact, PartFace, classify_contact, compute_geom
 from apo_bench.assembly.facing_pairs import find_facing_pairs
 from apo_bench.errors import InputError
 from apo_bench.geometry import shrink_pieces
-from apo_bench.importers.assembly.contact_search import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.importers.assembly.contact_search import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, find_walls_without_play
 from apo_bench.importers.assembly.posed_parts import PosedPart
-from apo_bench.scenario.parts.fit_faces import with_fit
+from apo_bench.scenario.parts.fit_faces import mark_fit_faces
 
 MOST_OVERLAP_MM = 0.2
 """Faces with a larger overlap do not recede: they are a press fit or a thread."""
@@ -39,11 +39,11 @@ def add_clearance(
         wide, thin = sorted(pair, key=lambda each: -each.solid.volume)
         # The smaller part recedes if it can; otherwise the larger one.
         for own, other in ((thin, wide), (wide, thin)):
-            tight = _tight_faces(own, other, most_mm)
+            tight = _find_tight_faces(own, other, most_mm)
             before = changed[own.name].fit
             fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
             try:
-                solid = with_fit(own.solid, {face: mm for face, mm in fit.items() if face not in own.fit})
+                solid = mark_fit_faces(own.solid, {face: mm for face, mm in fit.items() if face not in own.fit})
                 shrink_pieces(solid, 1e-3 * clearance_mm)
             except InputError as error:
                 notes.append(f"'{own.name}' gets no play in '{other.name}': {str(error).rstrip('.')}")
@@ -59,7 +59,7 @@ def add_clearance(
     return tuple(changed.values()), tuple(notes)
 
 
-def _tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
+def _find_tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
     """Return the faces of `own` that need play against `other` -> the depth of their overlap, [mm], 0 if none."""
     pairs = find_facing_pairs(
         own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE
@@ -67,16 +67,16 @@ def _tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[st
     gaps = {Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m for each in pairs}
     gaps = {contact: gap_m for contact, gap_m in gaps.items() if gap_m < NEAR_M}  # touching or overlapping
     solids = {own.name: own.solid, other.name: other.solid}
-    walls = walls_without_play(solids, {own.name: own.T, other.name: other.T}, gaps)
+    walls = find_walls_without_play(solids, {own.name: own.T, other.name: other.T}, gaps)
     # Both walls of a slot without play, even where they do not overlap.
     held = {contact for pair in walls for contact in pair}
     deep = [(c.manipulated.face, -1e3 * gap) for c, gap in gaps.items() if c in held or gap < -NEAR_M]
-    deep += _tight_shafts(own, other, gaps, most_mm)
+    deep += _find_tight_shafts(own, other, gaps, most_mm)
     # A face that mates with several faces recedes by the largest overlap: pairs are sorted, so the deepest wins.
     return {face: round(max(0.0, mm), _DIGITS) for face, mm in sorted(deep)}
 
 
-def _tight_shafts(
+def _find_tight_shafts(
     own: PosedPart, other: PosedPart, gaps: Mapping[Contact, float], most_mm: float
 ) -> Iterator[tuple[str, float]]:
     """Yield round faces of `own` in shaft-hole pairs without play, and their overlap of radii, [mm].

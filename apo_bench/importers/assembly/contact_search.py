@@ -60,8 +60,8 @@ def close_contacts(
     dropped = list[Contact]()
     free = [part for part in solids if part not in set(fixed)]
     while True:
-        solved = _solve(solids, poses, kept, free)
-        off = [_openness(solids, solved, contact) for contact in kept]
+        solved = _solve_poses(solids, poses, kept, free)
+        off = [_measure_openness(solids, solved, contact) for contact in kept]
         if not kept or max(off) <= 1.0:
             return solved, tuple(kept), tuple(dropped)
         # Contacts contradict each other: drop the one with the largest residual, and solve again.
@@ -77,7 +77,7 @@ def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float)
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep_m = measure_intrusion(solids[a], poses[a], solids[b], poses[b])
-        tight = _tight_fit(solids, poses, (a, b), clearance_mm, deep_m)
+        tight = _find_tight_fit(solids, poses, (a, b), clearance_mm, deep_m)
         if tight:
             sentences.append(tight)
         elif deep_m > DEEP_M:
@@ -85,7 +85,7 @@ def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float)
     return sentences
 
 
-def walls_without_play(
+def find_walls_without_play(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact]
 ) -> tuple[tuple[Contact, Contact], ...]:
     """Return pairs of contacts at opposite flat walls that enclose a part without play, none marked as fit."""
@@ -95,17 +95,17 @@ def walls_without_play(
         (contact, opposite)
         for contact, opposite in combinations(firm, 2)
         if {of.part for of in contact} == {of.part for of in opposite}
-        and _normal(solids, poses, contact) @ _normal(solids, poses, opposite) < -1.0 + 1e-6
+        and _contact_normal(solids, poses, contact) @ _contact_normal(solids, poses, opposite) < -1.0 + 1e-6
     )
 
 
-def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Array:
+def _contact_normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Array:
     """Return the normal of one face of a contact, (3,), world: of the part whose name sorts first."""
     of = min(contact)
     return np.asarray(poses[of.part][:3, :3] @ solids[of.part].faces[of.face].normal)
 
 
-def _tight_fit(
+def _find_tight_fit(
     solids: Mapping[str, Solid], poses: Poses, pair: tuple[str, str], clearance_mm: float, deep_m: float
 ) -> str:
     """Return a sentence about a shaft without play in its hole, for a pair of parts; empty if there is none.
@@ -129,7 +129,7 @@ def _tight_fit(
     return ""
 
 
-def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
+def _solve_poses(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
     """Return poses at which all contacts are closed, by Gauss-Newton steps of least motion.
 
     Args:
@@ -144,7 +144,7 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
         rows = list[Array]()
         values = list[Array]()
         for contact in contacts:
-            each = _facing(solids, now, contact)
+            each = _find_pair(solids, now, contact)
             if each is None:
                 continue
             scale = np.where(np.arange(len(each.residual)) < each.lengths, 1.0, _ARM_M)
@@ -167,7 +167,7 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
     return now
 
 
-def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> FacingPair | None:
+def _find_pair(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> FacingPair | None:
     """Return gap, angle and residuals of the two faces of a contact; None if the faces do not overlap.
 
     Limits are wider than those of a contact, since contacts open while others are closed.
@@ -185,9 +185,9 @@ def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Faci
     return next((pair for pair in pairs if (pair.a, pair.b) == (a.face, b.face)), None)
 
 
-def _openness(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
+def _measure_openness(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
     """Return how far a contact is from closed: at most 1 if closed, inf if the faces do not overlap."""
-    each = _facing(solids, poses, contact)
+    each = _find_pair(solids, poses, contact)
     if each is None:
         return np.inf
     # The angle of a cone on a rim is free.

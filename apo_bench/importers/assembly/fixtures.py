@@ -45,20 +45,20 @@ def make_fixture(name: str, solid: Solid, R: Array) -> Solid:
     T = np.eye(4)
     T[:3] = np.column_stack([R, [0.0, 0.0, rise]])
     inset = np.minimum(_BESIDE_M, (high - low)[:2] / 4)
-    fitted = [_fit_height(each, solid, T) for each in _columns(solid, R, rise, low[:2] + inset, high[:2] - inset)]
+    fitted = [_fit_height(each, solid, T) for each in _make_columns(solid, R, rise, low[:2] + inset, high[:2] - inset)]
     feet = np.concatenate([np.zeros((0, 2)), *((b.center + _CORNERS * b.half)[:, :2] for b in fitted if b.half[2] > 0)])
     middle = R @ solid.centroid
     # The columns alone do not keep the part from toppling.
-    walls = [] if is_carried(feet, middle, float(middle[2] - low[2])) else _walls(low, high)
+    walls = [] if is_carried(feet, middle, float(middle[2] - low[2])) else _make_walls(low, high)
     beside = _WALL_M if walls else -inset  # the plate reaches under walls, or ends at the columns
-    plate = _box_between((*(low[:2] - beside), 0.0), (*(high[:2] + beside), FLOOR_M - _BELOW_M))
+    plate = _make_box((*(low[:2] - beside), 0.0), (*(high[:2] + beside), FLOOR_M - _BELOW_M))
     columns = [box for box in fitted if box.half[2] > plate.half[2] + _INSET_M and box.half.min() > THINNEST_M]
     boxes = tuple(Box(f"p{i}", b.center, b.half) for i, b in enumerate((plate, *columns, *walls), start=1))
     # Fixed, so its mass does not matter.
     return Solid(name=name, faces={}, pieces=boxes, centroid=np.zeros(3), volume=1.0)
 
 
-def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> list[Box]:
+def _make_columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> list[Box]:
     """Return a column below each cell of a grid, as high as the lowest point of the part above the cell.
 
     Args:
@@ -73,15 +73,15 @@ def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> li
     x, y = (np.linspace(low[i], high[i], 1 + cells[i]) for i in (0, 1))
     boxes = []
     for y0, y1 in pairwise(y):
-        tops = [_lowest_above(solid, R, (x0, y0), (x1, y1)) + rise - _BELOW_M for x0, x1 in pairwise(x)]
+        tops = [_measure_lowest_point(solid, R, (x0, y0), (x1, y1)) + rise - _BELOW_M for x0, x1 in pairwise(x)]
         for top, same in groupby(range(len(tops)), key=lambda i: round(tops[i], 6)):
             run = list(same)
             if np.isfinite(top):  # some of the part is above these cells
-                boxes.append(_box_between((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
+                boxes.append(_make_box((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
     return boxes
 
 
-def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple[float, float]) -> float:
+def _measure_lowest_point(solid: Solid, R: Array, begin: tuple[float, float], end: tuple[float, float]) -> float:
     """Return the height over its frame of the lowest point of a turned solid above a rectangle, [m]; inf if none.
 
     Args:
@@ -101,11 +101,11 @@ def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
         depth = float(measure_intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
         if depth <= 0.0:
             return box
-        box = _box_between((*low, 0.0), (*high, 2 * max(0.0, box.half[2] - depth)))
-    return _box_between((*low, 0.0), (*high, 0.0))
+        box = _make_box((*low, 0.0), (*high, 2 * max(0.0, box.half[2] - depth)))
+    return _make_box((*low, 0.0), (*high, 0.0))
 
 
-def _walls(low: Array, high: Array) -> list[Box]:
+def _make_walls(low: Array, high: Array) -> list[Box]:
     """Return four walls around the bounding box from `low` to `high`, (3,) each, [m]; they stand on the table."""
     top = FLOOR_M + min(_WALL_SHARE * (high[2] - low[2]), _HIGHEST_M)
     middle, reach = (low + high)[:2] / 2, (high - low)[:2] / 2 + _PLAY_M
@@ -119,7 +119,7 @@ def _walls(low: Array, high: Array) -> list[Box]:
     return boxes
 
 
-def _box_between(low: Sequence[float], high: Sequence[float]) -> Box:
+def _make_box(low: Sequence[float], high: Sequence[float]) -> Box:
     """Return the unnamed box between two opposite corners, lowest and highest coordinates."""
     return Box("", np.add(low, high) / 2, np.subtract(high, low) / 2)
 
@@ -127,7 +127,8 @@ def _box_between(low: Sequence[float], high: Sequence[float]) -> Box:
 def fixture_xml(fixture: Solid) -> str:
     """Return the MJCF text of the part file of a fixture."""
     geoms = [
-        f'      <geom name="{b.name}" pos="{_numbers(b.center)}" size="{_numbers(b.half)}"/>' for b in fixture.pieces
+        f'      <geom name="{b.name}" pos="{_format_numbers(b.center)}" size="{_format_numbers(b.half)}"/>'
+        for b in fixture.pieces
     ]
     return "\n".join(
         [
@@ -143,5 +144,5 @@ def fixture_xml(fixture: Solid) -> str:
     )
 
 
-def _numbers(values: Array) -> str:
+def _format_numbers(values: Array) -> str:
     return " ".join(f"{float(x):.9g}" for x in values)

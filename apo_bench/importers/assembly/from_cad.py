@@ -10,9 +10,9 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.cad.near_points import coming_near
-from apo_bench.importers.cad.part_import import import_solid, raw_solids
-from apo_bench.importers.cad.pose_file import named_places, write_places
+from apo_bench.importers.cad.near_points import find_near_points
+from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
+from apo_bench.importers.cad.pose_file import name_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
 _UPRIGHT = 1.0 - 1e-9  # cosine between axis and z of an upright round face
@@ -51,7 +51,7 @@ def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -
     lines: list[str] = []
     found: list[tuple[str, RawSolid]] = []
     for file in files:
-        source, solids = raw_solids(file, unit)
+        source, solids = read_raw_solids(file, unit)
         left_out = source.left_out
         require(not left_out, f"{file}: {len(left_out)} of its solids can be no parts: {' '.join(left_out)}")
         lines += (f"{file.name}: {warning}" for warning in source.warnings)
@@ -62,19 +62,19 @@ def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -
     )
     folder.mkdir(parents=True, exist_ok=True)
     places: dict[str, list[SolidPlace]] = {}
-    for (file_name, raw), others in zip(found, coming_near([raw for _, raw in found]), strict=True):
+    for (file_name, raw), others in zip(found, find_near_points([raw for _, raw in found]), strict=True):
         name = make_part_name(raw.name, places)
-        foot = _foot(raw)
+        foot = _find_foot(raw)
         title = clean_title(raw.name)
-        part = import_solid(_shift(raw, -foot), name, folder, f"{file_name}, {title}", others=others - foot)
+        part = import_solid(_shift_solid(raw, -foot), name, folder, f"{file_name}, {title}", others=others - foot)
         places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
         called = f" ({title})" if raw.name != name else ""
         lines.append(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
         lines += (f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items())
-    return write_places(named_places(places), folder, ", ".join(file.name for file in files)), tuple(lines)
+    return write_places(name_places(places), folder, ", ".join(file.name for file in files)), tuple(lines)
 
 
-def _foot(raw: RawSolid) -> Array:
+def _find_foot(raw: RawSolid) -> Array:
     """Return the middle of the lower side of the solid's bounding box, (3,), rounded to a micrometre, [mm].
 
     If the axis of an upright round face passes near this middle, the axis is used: a coarse mesh of a round face has an
@@ -89,7 +89,7 @@ def _foot(raw: RawSolid) -> Array:
     return np.round([*middle, low[2]], 3)
 
 
-def _shift(raw: RawSolid, by: Array) -> RawSolid:
+def _shift_solid(raw: RawSolid, by: Array) -> RawSolid:
     """Move a solid by a vector, (3,), [mm]."""
     mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
     return replace(raw, mesh=mesh, regions=tuple(_shift_region(region, by) for region in raw.regions))

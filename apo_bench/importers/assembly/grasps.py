@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, PadPlace, Solid, find_holds, pose
-from apo_bench.importers.assembly.order_search import Placing
+from apo_bench.importers.assembly.order_search import Placement
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.planning.insertion.arrival import plan_arrival
 from apo_bench.planning.insertion.macros import UP
@@ -27,7 +27,7 @@ _MOST_HOLDS = 40
 _LIFT_M = 0.03  # the straight lift from the start that must be free
 
 
-class FoundGrasps(NamedTuple):
+class GraspSearchResult(NamedTuple):
     """The grasps of all moved parts."""
 
     grasps: Mapping[str, Grasp | None]  # None: no place can be held from above
@@ -40,9 +40,9 @@ def find_grasps(
     poses: Poses,
     starts: Poses,
     fixtures: Mapping[str, Solid],
-    order: Sequence[Placing],
+    order: Sequence[Placement],
     base: Sequence[str],
-) -> FoundGrasps:
+) -> GraspSearchResult:
     """Return the best grasp of each moved part that is free at its start, at its goal and along its insertion path.
 
     Args:
@@ -64,28 +64,28 @@ def find_grasps(
         fixture = {fixtures[main].name: fixtures[main]} if main in fixtures else {}
         at_start = {TABLE: now[TABLE], **{name: starts[name] for name in (main, *fixture)}}
         # A part that was put down before, as the base of a sub-assembly, is taken from there and not from its start.
-        taken = _resting({**solids, **fixture}, main, now if main in now else at_start, placing.moves)
+        taken = _list_resting_parts({**solids, **fixture}, main, now if main in now else at_start, placing.moves)
         T = placing.at @ pose.inverse(poses[main])  # moves all carried parts rigidly to the goal of the operation
         now |= {part: T @ poses[part] for part in placing.moves}
-        goal = _resting(solids, main, now, placing.moves)
+        goal = _list_resting_parts(solids, main, now, placing.moves)
         lift = Stroke(taken.T, -UP, _LIFT_M, taken.around)
-        strokes = (lift, _stroke(solids, placing, now, goal))
-        places = [*_places_from_above(solid, taken.T, arm.opening_m)]
+        strokes = (lift, _plan_stroke(solids, placing, now, goal))
+        places = [*_list_holds_from_above(solid, taken.T, arm.opening_m)]
         clear = (find_clear_grasp(kinematics, solid, grasps, (taken, goal), strokes) for grasps in places)
         best[main] = next((grasp for grasp in clear if grasp is not None), None)
         # Without room for the gripper, keep the best place: a person may change it in the file.
-        if best[main] is None and (offered := find_holds(solid, _up(goal.T), arm.opening_m)):
-            best[main] = _grasp(offered[0])
+        if best[main] is None and (offered := find_holds(solid, _up_in_part(goal.T), arm.opening_m)):
+            best[main] = _make_grasp(offered[0])
             crowded.add(main)
-    return FoundGrasps(best, frozenset(crowded))
+    return GraspSearchResult(best, frozenset(crowded))
 
 
-def _resting(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:
+def _list_resting_parts(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:
     """Return a part at rest and the obstacles around it: all parts of `at` but the moved ones."""
     return RestingPart(at[part], list_obstacles({name: solids[name] for name in at}, at, moves))
 
 
-def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: RestingPart) -> Stroke:
+def _plan_stroke(solids: Mapping[str, Solid], placing: Placement, now: Poses, goal: RestingPart) -> Stroke:
     """Return the straight insertion path to the goal, and the obstacles at the goal.
 
     Args:
@@ -97,18 +97,18 @@ def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: Res
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
-def _places_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator[list[Grasp]]:
+def _list_holds_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator[list[Grasp]]:
     """Yield the grasps from above for each height of the fingertips over the part, best first within each height.
 
     Args:
         T: (4, 4), pose of the part in the world.
     """
-    up = _up(T)
+    up = _up_in_part(T)
     for over in _OVER_M:
-        yield [_grasp(hold) for hold in _best_of_each_height(find_holds(solid, up, opening_m, over), up)]
+        yield [_make_grasp(hold) for hold in _choose_best_by_height(find_holds(solid, up, opening_m, over), up)]
 
 
-def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:
+def _choose_best_by_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:
     """Yield at most `_MOST_HOLDS` places of each height, from places sorted best first.
 
     Every height is kept, since a high place, though a worse hold, may be the only one with room.
@@ -121,10 +121,10 @@ def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadP
             yield place
 
 
-def _up(T: Array) -> Array:
+def _up_in_part(T: Array) -> Array:
     """Return the world's vertical in the frame of a part at T, (3,)."""
     return np.round(T[2, :3], 9)
 
 
-def _grasp(hold: PadPlace) -> Grasp:
+def _make_grasp(hold: PadPlace) -> Grasp:
     return Grasp(hold.point, hold.across, hold.half_width, None)

@@ -9,10 +9,15 @@ import numpy as np
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
 from apo_bench.geometry import Array, Solid, measure_extent, pose
-from apo_bench.importers.assembly.contact_search import close_contacts, find_clashes, find_contacts, walls_without_play
+from apo_bench.importers.assembly.contact_search import (
+    close_contacts,
+    find_clashes,
+    find_contacts,
+    find_walls_without_play,
+)
 from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
-from apo_bench.importers.assembly.grasps import FoundGrasps, find_grasps
-from apo_bench.importers.assembly.order_search import OrderSearch, Placing
+from apo_bench.importers.assembly.grasps import GraspSearchResult, find_grasps
+from apo_bench.importers.assembly.order_search import OrderSearch, Placement
 from apo_bench.importers.assembly.posed_parts import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
 from apo_bench.importers.cad.solids import find_free_name
@@ -35,7 +40,7 @@ class NewScenario:
     """The parts at the poses at which all contacts are closed, on the table."""
     fixed: tuple[str, ...]
     why_fixed: str  # the reason for the choice of the fixed parts, for a comment
-    order: tuple[Placing, ...]
+    order: tuple[Placement, ...]
     starts: Mapping[str, Array]
     """Part or fixture -> its start pose, (4, 4), world; of fixed parts the pose in the frame of the assembly, [m]."""
     stances: Mapping[str, Stance]  # moved part -> how it stands at its start
@@ -62,7 +67,7 @@ def new_scenario(
     clearance_mm: float = 0.25,
     wanted_order: Sequence[str] = (),
 ) -> NewScenario:
-    """Make a scenario from parts that stand on the table as `on_the_table` puts them.
+    """Make a scenario from parts that stand on the table as `place_on_table` puts them.
 
     Args:
         fixed: Names of parts that stay in place; empty: the largest of the lowest parts.
@@ -77,7 +82,7 @@ def new_scenario(
     solids = {each.name: each.solid for each in parts}
     for name in fixed:
         require_known("part", name, solids)
-    base = tuple(fixed) or lowest(parts)[:1]
+    base = tuple(fixed) or find_lowest_part(parts)[:1]
     why_fixed = "as asked" if fixed else "the largest of the lowest"
     solids |= {TABLE: load_part(TABLE)}
     poses: Poses = {each.name: each.T for each in parts} | {TABLE: np.eye(4)}
@@ -90,12 +95,12 @@ def new_scenario(
         *(f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped),
         *(
             f"'{contact}' and '{opposite}' leave no play between them; state fit = true for its faces"
-            for contact, opposite in walls_without_play(solids, poses, contacts)
+            for contact, opposite in find_walls_without_play(solids, poses, contacts)
         ),
         *(
             f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing; draw them "
             "line to line, and the added clearance gives them play"
-            for contact, opposite in walls_without_play(solids, poses, sorted(apart))
+            for contact, opposite in find_walls_without_play(solids, poses, sorted(apart))
         ),
     ]
     reach = find_reach(solids, poses, [each.name for each in parts])
@@ -132,7 +137,7 @@ def new_scenario(
         elif stances[part].rolls:
             notes.append(f"'{part}' lies on a round wall at its start and may roll")
     found = find_grasps(solids, poses, starts, fixtures, order, base)
-    unfit = tuple(_unfit(solids, turns, found))
+    unfit = tuple(_find_unfit_parts(solids, turns, found))
     return NewScenario(
         parts=tuple(replace(each, T=poses[each.name]) for each in parts),
         fixed=base,
@@ -149,14 +154,16 @@ def new_scenario(
     )
 
 
-def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
+def find_lowest_part(parts: Sequence[PosedPart]) -> tuple[str, ...]:
     """Return the parts that lie on the table, the largest first."""
     low = {each.name: measure_extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
     lie = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
     return tuple(each.name for each in sorted(lie, key=lambda each: -each.solid.volume))
 
 
-def _unfit(solids: Mapping[str, Solid], turns: Mapping[str, Array], found: FoundGrasps) -> Iterator[str]:
+def _find_unfit_parts(
+    solids: Mapping[str, Solid], turns: Mapping[str, Array], found: GraspSearchResult
+) -> Iterator[str]:
     """Yield a note for each part that the robot cannot grasp, with its size as it stands.
 
     Args:

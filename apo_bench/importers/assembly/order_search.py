@@ -34,11 +34,11 @@ class RemovalObstacle(NamedTuple):
     """Why a part cannot be removed."""
 
     passed: int
-    """How many tests of `_leave` the part passed, 0 to 3."""
+    """How many tests of `_plan_removal` the part passed, 0 to 3."""
     reason: str
 
 
-class Placing(NamedTuple):
+class Placement(NamedTuple):
     """One operation of the order that was found."""
 
     moves: tuple[str, ...]
@@ -70,30 +70,30 @@ class OrderSearch:
     left: frozenset[str] = frozenset()
     """The smallest set of parts reached of which none could be removed."""
 
-    def find(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
+    def find(self, fixed: frozenset[str]) -> tuple[Placement, ...] | None:
         """Return the operations that assemble all parts in order; None if there is no such order."""
-        return self._order_of(frozenset(self.solids), fixed | {TABLE})
+        return self._order_removals(frozenset(self.solids), fixed | {TABLE})
 
-    def stuck(self) -> list[str]:
+    def describe_stuck_parts(self) -> list[str]:
         """Return one sentence for each part of the smallest stuck set: why the part cannot be removed."""
         return [obstacle.reason for part, obstacle in self.obstacles.items() if part in self.left]
 
-    def _order_of(self, there: frozenset[str], base: frozenset[str]) -> tuple[Placing, ...] | None:
+    def _order_removals(self, there: frozenset[str], base: frozenset[str]) -> tuple[Placement, ...] | None:
         """Return the operations that lead from `base` to the parts in `there`; None if there is no order."""
         if there == base:
             return ()
         if there in self.failed or len(self.failed) > _MOST_SETS:
             return None
-        for placing in self._leaving(there, base):
-            before = self._order_of(there - set(placing.moves), base)
+        for placing in self._list_removable(there, base):
+            before = self._order_removals(there - set(placing.moves), base)
             if before is not None:
-                # Never None here: `_leaving` tests it.
-                beside = self._put_together_beside(placing.moves) if len(placing.moves) > 1 else None
+                # Never None here: `_list_removable` tests it.
+                beside = self._can_preassemble(placing.moves) if len(placing.moves) > 1 else None
                 return (*before, *(beside or ()), placing)
         self.failed.add(there)
         return None
 
-    def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
+    def _list_removable(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placement]:
         """Yield the possible removals, the best first; groups only if no single part can be removed.
 
         Args:
@@ -103,24 +103,24 @@ class OrderSearch:
         free = [part for part in self.solids if part in there - base]
         single = []
         for part in free:
-            found = self._leave((part,), there)
-            if isinstance(found, Placing):
+            found = self._plan_removal((part,), there)
+            if isinstance(found, Placement):
                 single.append(found)
             elif found.passed >= self.obstacles.get(part, found).passed:
                 self.obstacles[part] = found
         if single:
-            yield from sorted(single, key=self._lateness)
+            yield from sorted(single, key=self._removal_priority)
             return
         large_first = sorted(free, key=lambda part: -self.solids[part].volume)
         for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
-            placing = self._leave(group, there) if self._is_connected(group) else None
-            if isinstance(placing, Placing) and self._put_together_beside(group) is not None:
+            placing = self._plan_removal(group, there) if self._is_connected(group) else None
+            if isinstance(placing, Placement) and self._can_preassemble(group) is not None:
                 yield placing
         # Reached if no group led to an order either: remember the smallest stuck set for the error message.
         if not self.left or len(free) < len(self.left):
             self.left = frozenset(free)
 
-    def _lateness(self, placing: Placing) -> tuple[float, ...]:
+    def _removal_priority(self, placing: Placement) -> tuple[float, ...]:
         """Return the sort key of a removal; the smallest is removed first, thus assembled last.
 
         Parts late in the wanted order come first, then insertions from above, then the highest, then the smallest.
@@ -134,7 +134,7 @@ class OrderSearch:
             self.solids[part].volume,
         )
 
-    def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | RemovalObstacle:
+    def _plan_removal(self, moves: Sequence[str], there: frozenset[str]) -> Placement | RemovalObstacle:
         """Return the operation that adds `moves` last to the other parts in `there`, or the obstacle.
 
         Args:
@@ -173,9 +173,9 @@ class OrderSearch:
         way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
-        return Placing(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
+        return Placement(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
 
-    def _put_together_beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
+    def _can_preassemble(self, group: tuple[str, ...]) -> tuple[Placement, ...] | None:
         """Return the operations that assemble a group next to the assembly, its main part on the table.
 
         None if the main part does not stand stably on the table, or if the group has no order.
@@ -190,9 +190,9 @@ class OrderSearch:
         solids = {part: self.solids[part] for part in (*group, TABLE)}
         inner = OrderSearch(solids, poses, find_contacts(solids, poses), self.aside)
         base = frozenset((main, TABLE))
-        first = inner._leave((main,), base)
-        rest = inner._order_of(frozenset(solids), base)
-        return None if rest is None or not isinstance(first, Placing) else (first, *rest)
+        first = inner._plan_removal((main,), base)
+        rest = inner._order_removals(frozenset(solids), base)
+        return None if rest is None or not isinstance(first, Placement) else (first, *rest)
 
     def _is_connected(self, group: Sequence[str]) -> bool:
         """Whether contacts within the group connect each part of the group to the first one."""

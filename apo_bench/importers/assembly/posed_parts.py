@@ -85,7 +85,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     return tuple(parts)
 
 
-def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
+def place_on_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
     """Return the assembly turned upright, its lowest point on the table, the middle of its box over the origin.
 
     Args:

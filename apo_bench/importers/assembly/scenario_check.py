@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.assembly import Plan, classify_contact, compute_placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import is_held, measure_extent
-from apo_bench.importers.assembly.contact_search import walls_without_play
+from apo_bench.importers.assembly.contact_search import find_walls_without_play
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.io import format_count, read_bytes
@@ -26,7 +26,7 @@ from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
 
 _ON_TABLE_M = 1e-4  # tolerance of "the part stands on the table"
-_STRUCK_M = 1e-4  # depth of the open gripper in another part that counts as a collision
+_COLLISION_M = 1e-4  # depth of the open gripper in another part that counts as a collision
 _SCREW = re.compile(r"(^|_)(m\d+(_|x|$)|screw|bolt|nut(_|$)|thread|spring)", re.IGNORECASE)
 """Names of screws, nuts and springs: no trial screws or bends parts."""
 _REMEDIES = {
@@ -70,11 +70,11 @@ def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "s
         InputError: There is no such file.
     """
     text = read_bytes(path, "scenario file (.toml)").decode("utf-8", "replace")
-    for finding in _findings(path, seeds, fidelity, arm):
-        yield finding if finding.ok else finding._replace(line=line_of(text, finding.sentence))
+    for finding in _list_findings(path, seeds, fidelity, arm):
+        yield finding if finding.ok else finding._replace(line=find_line(text, finding.sentence))
 
 
-def line_of(text: str, sentence: str) -> int | None:
+def find_line(text: str, sentence: str) -> int | None:
     """Return the line, from 1, of the entry that a sentence names at its beginning; None if it names none.
 
     Such beginnings are `operation 2, grasp`, `parts, pin, start` or `site`. A missing key gives the line of its table.
@@ -94,32 +94,32 @@ def line_of(text: str, sentence: str) -> int | None:
     return 1 + next((i for i in body if key and re.match(rf"{key}\s*=", lines[i])), heads[k])
 
 
-def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Finding]:
+def _list_findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Finding]:
     """Yield the findings of all stages in order; a file that cannot be read or built ends the check."""
     try:
         scenario = load_scenario(path)
     except InputError as error:
         yield Finding("file", False, str(error).removeprefix(f"{path}, ").removeprefix(f"{path}: "))
         return
-    yield Finding("file", True, _summary(scenario))
-    yield from _check("parts", _parts(scenario), "no part is a screw, nut or spring by its name")
-    yield from _check("starts", _starts(scenario), "every part stands at its start")
-    yield from _check("ways", _ways(scenario), "a straight way leads every part to its place")
-    yield from _check("play", _play(scenario), "no part is held between walls without play")
+    yield Finding("file", True, _summarise(scenario))
+    yield from _run_check("parts", _check_parts(scenario), "no part is a screw, nut or spring by its name")
+    yield from _run_check("starts", _check_starts(scenario), "every part stands at its start")
+    yield from _run_check("ways", _check_insertions(scenario), "a straight way leads every part to its place")
+    yield from _run_check("play", _check_play(scenario), "no part is held between walls without play")
     try:
         scene = build_scene(scenario, arm=arm)
     except InputError as error:
         # `operation 2: the grasp` names the key `grasp`.
         yield Finding("gripper", False, re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error)))
         return
-    yield from _check("gripper", _room(scenario, scene), "every part can be held and lifted")
-    far = list(_reach(scenario, scene))
-    yield from _check("reach", far, "the arm reaches every start and goal, wherever the site may be")
+    yield from _run_check("gripper", _check_room_for_grasps(scenario, scene), "every part can be held and lifted")
+    far = list(_check_reach(scenario, scene))
+    yield from _run_check("reach", far, "the arm reaches every start and goal, wherever the site may be")
     # If something is out of reach, suggest a place of the site at which everything is in reach.
-    if far and (place := place_in_reach(scene, lambda nearer: not any(_reach(nearer.scenario, nearer)))):
+    if far and (place := place_in_reach(scene, lambda nearer: not any(_check_reach(nearer.scenario, nearer)))):
         yield Finding("reach", False, place)
     config = TrialConfig(str(path), arm=arm, noise_mm=0.0, noise_deg=0.0, method="oracle", fidelity=fidelity)
-    failures = list(_trials(replace(config, clearance_mm=scene.clearance_mm), scenario, scene, seeds))
+    failures = list(_check_trials(replace(config, clearance_mm=scene.clearance_mm), scenario, scene, seeds))
     yield from (Finding("oracle", False, sentence) for sentence in failures)
     if seeds:
         counted = f"{seeds - len(failures)} of {format_count(seeds, 'trial')}"
@@ -127,13 +127,13 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
         yield Finding("oracle", not failures, sentence)
 
 
-def _check(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
+def _run_check(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
     """Yield a failed finding for each sentence of `wrong`, or one finding `well` if there is none."""
     findings = [Finding(what, False, sentence) for sentence in wrong]
     yield from findings or [Finding(what, True, well)]
 
 
-def _summary(scenario: Scenario) -> str:
+def _summarise(scenario: Scenario) -> str:
     """Return the counts of parts, operations and contacts by kind; the table is no part."""
     assembly = scenario.assembly
     contacts = [contact for operation in assembly.operations for contact in operation.contacts]
@@ -143,13 +143,13 @@ def _summary(scenario: Scenario) -> str:
     return f"{parts} parts, {len(assembly)} operations, {len(contacts)} contacts ({counts})"
 
 
-def _parts(scenario: Scenario) -> Iterator[str]:
+def _check_parts(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each part that is a screw, nut or spring by its name."""
     for part in filter(_SCREW.search, scenario.assembly.solids):
         yield f"parts, {part}: nothing is screwed or bent here; leave the part out, or give it another name"
 
 
-def _starts(scenario: Scenario) -> Iterator[str]:
+def _check_starts(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each movable part on the table that does not stand stably at its start."""
     for part, solid in scenario.assembly.solids.items():
         T = scenario.start[part]
@@ -162,26 +162,26 @@ def _starts(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _ways(scenario: Scenario) -> Iterator[str]:
+def _check_insertions(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each operation without a collision-free straight insertion path."""
     for k, each in enumerate(list_nominal_operations(scenario), start=1):
         if not each.after.free:
             yield f"operation {k}, contacts: no straight way leads '{each.main}' to its goal; change the order"
 
 
-def _play(scenario: Scenario) -> Iterator[str]:
+def _check_play(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each pair of opposite flat walls that hold a part without play, neither marked as fit."""
     assembly = scenario.assembly
     stages = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
-        for contact, opposite in walls_without_play(assembly.solids, poses, operation.contacts):
+        for contact, opposite in find_walls_without_play(assembly.solids, poses, operation.contacts):
             yield (
                 f"operation {k}, contacts: '{contact}' and '{opposite}' leave no play; state fit = true for the faces "
                 "of the slot in its part file, or make the part thinner"
             )
 
 
-def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
+def _check_room_for_grasps(scenario: Scenario, scene: Scene) -> Iterator[str]:
     """Yield a sentence for each grasp that does not hold its part, and for each grasp without room for the gripper."""
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True), start=1):
         # The third row of R is world z in the part frame.
@@ -199,7 +199,7 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
         operation = scenario.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
         depth, other = find_gripper_overlap(scene, move.transfer, poses, after)
-        if depth > _STRUCK_M:
+        if depth > _COLLISION_M:
             yield (
                 f"operation {move.step.operation + 1}, grasp: the open gripper would be {1e3 * depth:.2g} mm deep in "
                 f"'{other}', and no other place from above has room; let '{operation.main}' stand out higher"
@@ -207,7 +207,7 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
         poses = after
 
 
-def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
+def _check_reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     """Yield a sentence for each part out of reach, with the site at its centre and at its four corners.
 
     At the centre the site has its mean yaw, at the corners the lowest or highest yaw. Each fault is told once per part.
@@ -232,7 +232,7 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
                 )
 
 
-def _trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
+def _check_trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
     """Yield a sentence for each trial that fails.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.importers.assembly.fixtures import fixture_xml
 from apo_bench.importers.assembly.new_scenario import NewScenario
-from apo_bench.importers.assembly.order_search import Placing
+from apo_bench.importers.assembly.order_search import Placement
 from apo_bench.importers.assembly.posed_parts import TABLE, PosedPart
 from apo_bench.io import clean, write_file
 from apo_bench.records import Thresholds
@@ -35,11 +35,11 @@ def write_scenario(new: NewScenario, path: Path, title: str, source: str) -> Non
     """Write the scenario file, and the part files of its fixtures next to it.
 
     Args:
-        title, source: As in `scenario_text`.
+        title, source: As in `format_scenario`.
     """
     for fixture in new.fixtures.values():
         write_file(_fixture_file(path, fixture), fixture_xml(fixture))
-    write_file(path, scenario_text(new, title, source, path))
+    write_file(path, format_scenario(new, title, source, path))
 
 
 def _fixture_file(path: Path, fixture: Solid) -> Path:
@@ -47,7 +47,7 @@ def _fixture_file(path: Path, fixture: Solid) -> Path:
     return path.with_name(f"{path.stem}_{fixture.name}.xml")
 
 
-def scenario_text(new: NewScenario, title: str, source: str, path: Path) -> str:
+def format_scenario(new: NewScenario, title: str, source: str, path: Path) -> str:
     """Return the text of the scenario file.
 
     Args:
@@ -69,19 +69,19 @@ def scenario_text(new: NewScenario, title: str, source: str, path: Path) -> str:
         *("", f"[parts.{TABLE}]", f'file = "{TABLE}"', "fixed = true"),
     ]
     for each in new.parts:
-        lines += ["", *_part_lines(new, each, path.parent)]
+        lines += ["", *_list_part_lines(new, each, path.parent)]
     for part, fixture in new.fixtures.items():
         lines += ["", f"[parts.{fixture.name}]  # '{part}' starts in it"]
         lines += [f"file = {_quote(_fixture_file(path, fixture).name)}", "fixed = true"]
-        lines.append(f"start = {_pose(new.starts[fixture.name])}")
+        lines.append(f"start = {_format_pose(new.starts[fixture.name])}")
     for placing in new.order:
-        lines += ["", *_operation_lines(new, placing)]
+        lines += ["", *_list_operation_lines(new, placing)]
     lines += [
         "",
         "[site]  # each trial puts the assembly elsewhere: in reach, clear of the parts that start beside it",
-        f"center_mm = {_list(1e3 * np.array(new.site.center_m))}",
-        f"spread_mm = {_list(1e3 * np.array(new.site.spread_m))}",
-        f"yaw_deg = {_list(np.degrees(new.site.yaw_rad))}",
+        f"center_mm = {_format_list(1e3 * np.array(new.site.center_m))}",
+        f"spread_mm = {_format_list(1e3 * np.array(new.site.spread_m))}",
+        f"yaw_deg = {_format_list(np.degrees(new.site.yaw_rad))}",
         "",
         "[judge]  # as in the scenarios of the package",
         *(f"{name} = {getattr(Thresholds(), name):g}  # {means}" for name, means in THRESHOLDS.items()),
@@ -89,7 +89,7 @@ def scenario_text(new: NewScenario, title: str, source: str, path: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def choice_lines(new: NewScenario) -> Iterator[str]:
+def list_choices(new: NewScenario) -> Iterator[str]:
     """Yield the choices of the import and its notes as lines for the terminal."""
     yield f"up: {new.up}"
     yield f"fixed: {', '.join(new.fixed)} ({new.why_fixed})"
@@ -99,7 +99,7 @@ def choice_lines(new: NewScenario) -> Iterator[str]:
     yield from (f"note: {note}" for note in new.notes)
 
 
-def _part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str]:
+def _list_part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str]:
     """Yield the lines of the tables of one part: file, color, start and faces that fit.
 
     Args:
@@ -110,38 +110,38 @@ def _part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str
     file = each.file.stem if is_packaged else Path(os.path.relpath(each.file, folder)).as_posix()
     yield f"file = {_quote(file)}"
     if each.color is not None:
-        yield f"color = {_list(np.round(each.color, 3))}"
+        yield f"color = {_format_list(np.round(each.color, 3))}"
     if each.name in new.fixed:
         yield f"fixed = true  # {new.why_fixed}"
         yield "follows_site = true  # it stands where the assembly stands"
-    yield f"start = {_pose(new.starts[each.name])}"
+    yield f"start = {_format_pose(new.starts[each.name])}"
     if each.fit:
         yield f"[parts.{each.name}.fit]  # faces that recede by the clearance, from this depth inside of the file's, mm"
         yield from (f"{face} = {inside_mm:g}" for face, inside_mm in each.fit.items())
 
 
-def _operation_lines(new: NewScenario, placing: Placing) -> Iterator[str]:
+def _list_operation_lines(new: NewScenario, placing: Placement) -> Iterator[str]:
     """Yield the lines of one operation: moved parts, goal, contacts and grasp."""
     main = placing.moves[0]
     yield f"[[operations]]  # {placing.why}"
     yield f'move = "{main}"'
     if placing.moves[1:]:
         yield "carries = [" + ", ".join(f'"{part}"' for part in placing.moves[1:]) + "]"
-    yield f"goal = {_pose(placing.at)}"
+    yield f"goal = {_format_pose(placing.at)}"
     pairs = [f'["{m.face if m.part == main else m}", "{e}"]' for m, e in placing.contacts]
     line = f"contacts = [{', '.join(pairs)}]"
     yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]
     hold = new.grasps[main]
     if hold is not None:
         wide = f"{2e3 * (hold.half_width or 0.0):.4g} mm between the fingers"
-        yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
+        yield f"grasp = {{ at_mm = {_format_list(1e3 * hold.point)}, across = {_format_axis(hold.across)} }}  # {wide}"
         return
     # No grasp was found: write one at the centre of mass, across the narrower horizontal side, for a person to edit.
     solid = next(each.solid for each in new.parts if each.name == main)
     level = new.starts[main][:2, :3]
     across = level[int(np.argmin(np.ptp(solid.bounds @ level.T, axis=0)))]
     at = np.clip(solid.centroid, *solid.bounds)
-    yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # NO PLACE for the gripper"
+    yield f"grasp = {{ at_mm = {_format_list(1e3 * at)}, across = {_format_axis(across)} }}  # NO PLACE for the gripper"
 
 
 def _quote(text: str) -> str:
@@ -149,19 +149,19 @@ def _quote(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _pose(T: Array) -> str:
+def _format_pose(T: Array) -> str:
     """Return the TOML table of a pose (4, 4), [m]: position in mm, rotation in degrees if there is any."""
     turn = pose.turn_deg(T)
-    turned = f", turn_deg = {_list(turn)}" if np.abs(turn).max() > 0.0 else ""
-    return f"{{ at_mm = {_list(1e3 * T[:3, 3])}{turned} }}"
+    turned = f", turn_deg = {_format_list(turn)}" if np.abs(turn).max() > 0.0 else ""
+    return f"{{ at_mm = {_format_list(1e3 * T[:3, 3])}{turned} }}"
 
 
-def _axis(axis: Array) -> str:
+def _format_axis(axis: Array) -> str:
     """Return an axis, (3,), as its letter if it is along x, y or z, otherwise as a list."""
     along = int(np.abs(axis).argmax())
-    return f'"{"xyz"[along]}"' if abs(axis[along]) > 1.0 - 1e-12 else _list(axis)
+    return f'"{"xyz"[along]}"' if abs(axis[along]) > 1.0 - 1e-12 else _format_list(axis)
 
 
-def _list(values: Iterable[float]) -> str:
+def _format_list(values: Iterable[float]) -> str:
     """Return a TOML list of numbers, rounded to 1e-8 to hide rounding errors."""
     return "[" + ", ".join(f"{round(float(x), 8) + 0.0:.12g}" for x in values) + "]"

@@ -48,7 +48,7 @@ def find_stance(solid: Solid, R: Array) -> Stance:
     """Return how a solid stands in an orientation R, (3, 3), world from part."""
     up = R[2]  # world z in the part frame
     low = measure_extent(solid.pieces, up)[0]
-    base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
+    base = (np.concatenate([_find_lowest_corners(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
     middle = R @ solid.centroid
     if is_carried(base, middle, float(middle[2] - low)):
         return Stance(-low, True, False)
@@ -74,7 +74,7 @@ def is_carried(base: Array, middle: Array, height_m: float) -> bool:
     return bool(is_above and carrier.exterior.distance(at) >= max(_LEAST_M, _SLOPE * height_m))
 
 
-def _lowest(piece: Piece, up: Array, low: float) -> Array:
+def _find_lowest_corners(piece: Piece, up: Array, low: float) -> Array:
     """Return the corners of a piece on the plane, (k, 3), part frame; of a lying cylinder the ends of its contact line.
 
     Args:
@@ -103,7 +103,7 @@ def choose_site(reach_m: float, is_beside: bool) -> Site:
 
 def find_reach(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) -> float:
     """Return an upper bound of the horizontal distance of any point of the parts from the origin of the table, [m]."""
-    boxes = [_box(solids[part], poses[part][:3, :3]) + poses[part][:2, 3] for part in parts]
+    boxes = [_bounding_rectangle(solids[part], poses[part][:3, :3]) + poses[part][:2, 3] for part in parts]
     return max((float(np.hypot(*np.abs(box).max(axis=0))) for box in boxes), default=0.0)
 
 
@@ -119,14 +119,14 @@ def stage_parts(
     Raises:
         InputError: There is no room.
     """
-    boxes = {part: _box(solids[part], R) for part, R in turns.items()}
+    boxes = {part: _bounding_rectangle(solids[part], R) for part, R in turns.items()}
     for room in _ROOMS_M:
         places: dict[str, Array] = {}
         taken: list[tuple[Array, Array]] = []
         for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
             low, high = boxes[part]
             half = (high - low) / 2
-            middle = next((at for at in _grid() if _is_free(at, half, taken, kept_free, room)), None)
+            middle = next((at for at in _list_grid_places() if _is_free(at, half, taken, kept_free, room)), None)
             if middle is None:
                 break
             taken.append((middle, half))
@@ -159,7 +159,7 @@ def _is_free(
     return is_apart and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
 
 
-def _grid() -> Array:
+def _list_grid_places() -> Array:
     """Return the candidate places within reach of the arm, (k, 2), the nearest to `_LIKED_M` first."""
     x, y = np.meshgrid(np.arange(-0.2, 0.26, _GRID_M), np.arange(-0.45, 0.451, _GRID_M), indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
@@ -170,6 +170,6 @@ def _grid() -> Array:
     return np.asarray(places[np.lexsort((places[:, 1], np.round(cost, 6)))])
 
 
-def _box(solid: Solid, R: Array) -> Array:
+def _bounding_rectangle(solid: Solid, R: Array) -> Array:
     """Return lowest and highest x and y of a turned solid relative to its frame, (2, 2), [m]."""
     return np.array([measure_extent(solid.pieces, R[0]), measure_extent(solid.pieces, R[1])]).T

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from apo_bench.errors import InputError
 from apo_bench.importers.assembly.added_clearance import MOST_OVERLAP_MM, add_clearance
-from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, lowest, new_scenario
-from apo_bench.importers.assembly.posed_parts import PosedPart, on_the_table
+from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, find_lowest_part, new_scenario
+from apo_bench.importers.assembly.posed_parts import PosedPart, place_on_table
 
 _UP_AXES = ("z", "-z", "x", "-x", "y", "-y")  # in the order of the attempts
 _MOST_BASES = 3  # of the lowest parts that are tried as base
@@ -38,7 +38,7 @@ def new_upright_scenario(
     failed: dict[str, NoAssemblyOrder | InputError] = {}
     for axis in (up,) if up else _UP_AXES:
         try:
-            scenario = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, wanted_order)
+            scenario = _try_bases(place_on_table(parts, axis), fixed, clearance_mm, wanted_order)
         except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
@@ -54,14 +54,14 @@ def new_upright_scenario(
     return replace(found[best], up=f"{best}, as with z up {why}")
 
 
-def _on_a_base(
+def _try_bases(
     parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float, wanted_order: Sequence[str]
 ) -> NewScenario:
     """Make the scenario on the fixed parts, or on the largest of the lowest parts for which an order exists."""
     try:
         return new_scenario(parts, fixed, clearance_mm, wanted_order)
     except NoAssemblyOrder:
-        for base in () if fixed else lowest(parts)[1:_MOST_BASES]:
+        for base in () if fixed else find_lowest_part(parts)[1:_MOST_BASES]:
             with suppress(NoAssemblyOrder):
                 scenario = new_scenario(parts, (base,), clearance_mm, wanted_order)
                 return replace(scenario, why_fixed="one of the lowest; with larger ones there is no order")

@@ -11,7 +11,7 @@ from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 _THINNEST_MM = 0.05  # largest radius of a round face that is too thin for contacts
 
 
-def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
+def make_contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
     """Return the flat and the round faces of the named regions, and the regions that make none -> the reason."""
     flats: list[Face] = []
     rounds: list[RoundFace] = []
@@ -25,14 +25,14 @@ def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str,
             span, radii = (1e-3 * np.array([region.span, region.radii])).tolist()
             point = 1e-3 * region.point
             rounds.append(RoundFace(region.name, point, region.direction, tuple(span), tuple(radii), region.hole))
-        elif (face := _flat_face(raw, region)) is not None:
+        elif (face := _make_flat_face(raw, region)) is not None:
             flats.append(face)
         else:
             refused[region.name] = "it has more than one outline"
     return flats, rounds, refused
 
 
-def _flat_face(raw: RawSolid, region: Region) -> Face | None:
+def _make_flat_face(raw: RawSolid, region: Region) -> Face | None:
     """Return a flat region as a face with its holes; None if it has more than one outline.
 
     Borders that are ends of round walls become finer polygons inside the true circle, within 0.005 mm.
@@ -45,12 +45,12 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
         return None
     offset = float(n @ region.point) * n
     rings = [ring @ flat + offset for ring in list_rings(area, 1.0)]
-    drawn = [_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
+    drawn = [_refine_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
     outline, *holes = (straighten(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
     return Face(region.name, outline, tuple(holes))
 
 
-def _circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
+def _refine_circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
     """Return a border, (k, 3), [mm]; if it is the whole end of a round wall, as a finer polygon than the mesh has.
 
     Args:

@@ -7,33 +7,35 @@ import numpy as np
 import trimesh
 
 from apo_bench.geometry import Hull
-from apo_bench.importers.cad.pieces.convex_cutting import Cut
+from apo_bench.importers.cad.pieces.convex_cutting import CutSolid
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, convert_to_mesh
-from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
+from apo_bench.scenario.parts.making.moments import Moments, compute_frustum_moments
 
 
-def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
+def compute_solid_moments(raw: RawSolid, cut: CutSolid) -> Moments:
     """Return the moments of a solid, [m]: its mesh, plus the slivers between the facets and the fitted round walls.
 
     If pieces are hulls of free-form shapes or fill holes, return the moments of the pieces.
     """
     if cut.hulls or cut.filled:
-        return moments_of_pieces(cut.pieces)
-    moments = _mesh_moments(raw.mesh)
+        return compute_piece_moments(cut.pieces)
+    moments = _compute_mesh_moments(raw.mesh)
     for region in raw.regions:
         if region.square:
             # Removes material at a hole.
-            moments = moments.plus(_behind_sides(raw.mesh, region), -1.0 if region.hole else 1.0)
+            moments = moments.plus(_compute_sliver_moments(raw.mesh, region), -1.0 if region.hole else 1.0)
     return moments.in_metres
 
 
-def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
+def compute_piece_moments(pieces: Iterable[Hull]) -> Moments:
     """Return the moments of the union of the pieces, [m]."""
     hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
-    return _mesh_moments(convert_to_mesh(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
+    return _compute_mesh_moments(
+        convert_to_mesh(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))
+    ).in_metres
 
 
-def _mesh_moments(mesh: Mesh) -> Moments:
+def _compute_mesh_moments(mesh: Mesh) -> Moments:
     """Return the moments of a closed mesh, [mm]."""
     found = trimesh.Trimesh(mesh.corners, mesh.triangles, process=False).mass_properties
     # The integral of x x^T about the centroid is trace(J) / 2 - J, J being the inertia.
@@ -41,9 +43,11 @@ def _mesh_moments(mesh: Mesh) -> Moments:
     return Moments(float(found.volume), np.zeros(3), second).moved(np.eye(3), found.center_mass)
 
 
-def _behind_sides(mesh: Mesh, wall: Region) -> Moments:
+def _compute_sliver_moments(mesh: Mesh, wall: Region) -> Moments:
     """Return the moments of the space between a round wall and its facets, [mm]."""
     corners = mesh.corners[np.unique(mesh.triangles[wall.triangles])]
-    within = _mesh_moments(convert_to_mesh(manifold3d.Manifold.hull_points(corners)))
-    true = frustum_moments(*wall.span, *wall.radii).moved(np.column_stack([*wall.across, wall.direction]), wall.point)
+    within = _compute_mesh_moments(convert_to_mesh(manifold3d.Manifold.hull_points(corners)))
+    true = compute_frustum_moments(*wall.span, *wall.radii).moved(
+        np.column_stack([*wall.across, wall.direction]), wall.point
+    )
     return true.plus(within, -1.0)

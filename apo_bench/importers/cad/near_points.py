@@ -16,21 +16,23 @@ _NONE = 1e-5
 """Solids overlap if their common volume exceeds this share of the smaller one's."""
 
 
-def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
+def find_near_points(raws: Sequence[RawSolid]) -> list[Array]:
     """Return for each solid the points of other solids that come near one of its copies, (k, 3), in its own frame.
 
     Others are sampled at their places, and while they move along the axes of the assembly where nothing blocks them.
     """
     bodies = [convert_to_manifold(raw.mesh) for raw in raws]
-    points = [surface_points(raw.mesh, _STEP_MM) for raw in raws]
+    points = [sample_surface_points(raw.mesh, _STEP_MM) for raw in raws]
     return [
         # Points are rounded to a grid, so that a point that passes several times counts once.
-        _once(np.concatenate([np.zeros((0, 3)), *_near_points(i, raws, bodies, points)]))
+        _round_to_grid(np.concatenate([np.zeros((0, 3)), *_list_near_points(i, raws, bodies, points)]))
         for i in range(len(raws))
     ]
 
 
-def _near_points(i: int, raws: Sequence[RawSolid], bodies: Sequence[Any], points: Sequence[Array]) -> Iterator[Array]:
+def _list_near_points(
+    i: int, raws: Sequence[RawSolid], bodies: Sequence[Any], points: Sequence[Array]
+) -> Iterator[Array]:
     """Yield the points of other solids near solid i, (k, 3), one array for each pair of copies and shift.
 
     Args:
@@ -45,12 +47,12 @@ def _near_points(i: int, raws: Sequence[RawSolid], bodies: Sequence[Any], points
                 moved = points[k] @ T[:3, :3].T + T[:3, 3]
                 if its is place or (moved.max(axis=0) < low).any() or (moved.min(axis=0) > high).any():
                     continue
-                for shift in _shifts(bodies[i], bodies[k].transform(T[:3]), place.T):
+                for shift in _list_free_shifts(bodies[i], bodies[k].transform(T[:3]), place.T):
                     shifted = moved + shift
                     yield shifted[((shifted > low) & (shifted < high)).all(axis=1)]
 
 
-def surface_points(mesh: Mesh, step: float) -> Array:
+def sample_surface_points(mesh: Mesh, step: float) -> Array:
     """Return the corners of a closed mesh, and points on its sides between them, (k, 3).
 
     Args:
@@ -61,12 +63,12 @@ def surface_points(mesh: Mesh, step: float) -> Array:
     return np.unique(np.asarray(fine.vert_properties)[:, :3].astype(np.float64), axis=0)
 
 
-def _once(points: Array) -> Array:
+def _round_to_grid(points: Array) -> Array:
     """Return points rounded to a grid of half a step, each grid point once."""
     return np.unique(np.round(2.0 * points / _STEP_MM), axis=0) * _STEP_MM / 2.0
 
 
-def _shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:
+def _list_free_shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:
     """Yield the zero shift, then the shifts along axes of the assembly on which the other solid leaves without overlap.
 
     Args:

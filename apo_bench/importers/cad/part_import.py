@@ -11,17 +11,17 @@ from shapely import Polygon
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays
-from apo_bench.importers.cad.contact_faces import contact_faces
+from apo_bench.importers.cad.contact_faces import make_contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
-from apo_bench.importers.cad.meshes.shells import closed_solids
-from apo_bench.importers.cad.moments import moments_of_pieces, solid_moments
-from apo_bench.importers.cad.pieces.convex_cutting import Cut, cut
+from apo_bench.importers.cad.meshes.shells import split_into_solids
+from apo_bench.importers.cad.moments import compute_piece_moments, compute_solid_moments
+from apo_bench.importers.cad.pieces.convex_cutting import CutSolid, cut_solid
 from apo_bench.importers.cad.solids import RawSolid, clean_title, merge_copies, name_regions
 from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.face_checks import check_faces, supported
+from apo_bench.scenario.parts.face_checks import check_faces, find_supported_area
 from apo_bench.scenario.parts.limits import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.scenario.parts.making import Body, build_solid, write_part
 from apo_bench.scenario.parts.making.moments import Moments
@@ -45,7 +45,7 @@ class ImportedPart:
     path: Path  # the part file
     raw: RawSolid
     solid: Solid  # the part as read back from its file
-    cut: Cut
+    cut: CutSolid
     refused: Mapping[str, str]
     """Faces that can make no contact -> the reason."""
     shares: Mapping[str, float]
@@ -54,7 +54,7 @@ class ImportedPart:
     """Hole -> the largest radius free of pieces around its axis, [mm]."""
 
 
-def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
+def read_raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
     """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
 
     Args:
@@ -67,7 +67,7 @@ def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -
     if path.suffix.lower() in STEP_SUFFIXES:
         return read_step(path, unit)
     file, meshes = read_meshes(path, unit)
-    solids = merge_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
+    solids = merge_copies(raw for name, mesh in meshes for raw in split_into_solids(path, name, mesh))
     return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
 
 
@@ -95,16 +95,18 @@ def import_solid(
         f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; "
         f"{1e3 * LIGHTEST_KG:g} g to {HEAVIEST_KG / 1e3:g} t are allowed.",
     )
-    flats, rounds, refused = contact_faces(raw)
+    flats, rounds, refused = make_contact_faces(raw)
     _check_faces(source, len(flats) + len(rounds))
     try:
-        pieces = cut(raw, others)
+        pieces = cut_solid(raw, others)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     refused |= dict.fromkeys(pieces.filled, _FILLED)
-    possible_moments = _possible_moments(source, raw, pieces)
+    possible_moments = _list_possible_moments(source, raw, pieces)
     body = Body(pieces.pieces, tuple(flats), tuple(rounds), possible_moments[0])
-    body, shares = _keep_held_faces(_without(body, refused), _LEAST_SHARE if pieces.hulls else _NEARLY_ALL, refused)
+    body, shares = _keep_held_faces(
+        _remove_faces(body, refused), _LEAST_SHARE if pieces.hulls else _NEARLY_ALL, refused
+    )
     _check_faces(source, len(body.flats) + len(body.rounds))
     stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
     title = clean_title(raw.name) if raw.name != name else ""
@@ -121,7 +123,7 @@ def import_solid(
     else:  # no moments gave a part that could be read
         why = str(fault).replace(f"{path.parent}{os.sep}", "").split("; ")[0].rstrip(".")
         raise InputError(f"{source}: its convex pieces make no part ({why}); leave out fillets.") from fault
-    free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
+    free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
 
 
@@ -131,7 +133,7 @@ def _check_faces(source: str, count: int) -> None:
     require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
 
 
-def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
+def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list[Moments]:
     """Return the moments to try: of the solid, then of its pieces if these omit no more than slivers, [m].
 
     Raises:
@@ -142,8 +144,8 @@ def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
     require(
         corners <= MOST_CORNERS_IN_ALL, f"{source}: the convex pieces of the part have {corners:,} corners; {most}."
     )
-    moments = solid_moments(raw, pieces)
-    own = moments_of_pieces(pieces.pieces)
+    moments = compute_solid_moments(raw, pieces)
+    own = compute_piece_moments(pieces.pieces)
     if all(region.kind == "plane" for region in raw.regions):
         filled = 1e9 * own.size
         require(
@@ -154,7 +156,7 @@ def _possible_moments(source: str, raw: RawSolid, pieces: Cut) -> list[Moments]:
     return [moments, own] if abs(own.size - moments.size) < _SLIVERS * own.size else [moments]
 
 
-def _without(body: Body, names: Container[str]) -> Body:
+def _remove_faces(body: Body, names: Container[str]) -> Body:
     """Return the body without the named faces."""
     flats = tuple(face for face in body.flats if face.name not in names)
     rounds = tuple(face for face in body.rounds if face.name not in names)
@@ -175,17 +177,17 @@ def _keep_held_faces(body: Body, least: float, refused: dict[str, str]) -> tuple
     shares: dict[str, float] = {}
     faces: list[Face | RoundFace] = [*body.flats, *body.rounds]
     for face in faces:
-        if not (reason := _fault(solid, face)):
+        if not (reason := _describe_fault(solid, face)):
             continue
-        less = supported(face, solid.pieces) if isinstance(face, Face) else None
-        if less is not None and less[1] > least and not _fault(solid, less[0]):
+        less = find_supported_area(face, solid.pieces) if isinstance(face, Face) else None
+        if less is not None and less[1] > least and not _describe_fault(solid, less[0]):
             flats[face.name], shares[face.name] = less
         else:
             refused[face.name] = reason
-    return _without(replace(body, flats=tuple(flats.values())), refused), shares
+    return _remove_faces(replace(body, flats=tuple(flats.values())), refused), shares
 
 
-def _fault(solid: Solid, face: Face | RoundFace) -> str:
+def _describe_fault(solid: Solid, face: Face | RoundFace) -> str:
     """Return the reason why a face does not agree with the pieces; empty if it does."""
     if isinstance(face, Face):
         across = np.argsort(np.abs(face.normal))[:2]  # the two axes most nearly square to the normal
@@ -199,7 +201,7 @@ def _fault(solid: Solid, face: Face | RoundFace) -> str:
     return ""
 
 
-def _free_radius(solid: Solid, wall: RoundFace) -> float:
+def _measure_free_radius(solid: Solid, wall: RoundFace) -> float:
     """Return the distance of the pieces from the axis of a hole, at its narrow end, [m]."""
     angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
     out = np.outer(np.cos(angle), wall.frame[:3, 0]) + np.outer(np.sin(angle), wall.frame[:3, 1])

@@ -31,11 +31,11 @@ def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) ->
     figure.suptitle(title)
     for k, view in enumerate(_VIEWS, start=1):
         axes = figure.add_subplot(1, 2, k, projection="3d", xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
-        _draw(axes, raw, colors, *view)
+        _draw_view(axes, raw, colors, *view)
     save_figure(figure, path)
 
 
-def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
+def _draw_view(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
     """Draw the triangles that face the viewer, and the name of each face at its most visible triangle.
 
     Args:

@@ -66,15 +66,15 @@ def _report_face(part: ImportedPart, name: str, region: Region) -> dict[str, Any
     }
 
 
-def file_lines(file: CadFile, path: Path) -> Iterator[str]:
+def format_file_report(file: CadFile, path: Path) -> Iterator[str]:
     """Yield `part.stl: unit mm, taken from the size; the file states none`, and the warnings."""
     yield f"{path}: unit {file.unit}, {file.unit_from}"
     yield from (f"{path}: {warning}" for warning in file.warnings)
 
 
-def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
+def format_part_report(report: Mapping[str, Any]) -> Iterator[str]:
     """Yield the report of one part as lines."""
-    yield f"{report['part']}: {_numbers(report['size_mm'], ' x ')} mm, {report['triangles']:,} triangles"
+    yield f"{report['part']}: {_format_numbers(report['size_mm'], ' x ')} mm, {report['triangles']:,} triangles"
     if report["title"] != report["part"]:
         yield f"  title: {report['title']}"
     yield from (f"  repaired: {repair}" for repair in report["repairs"])
@@ -82,20 +82,20 @@ def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"  places in the file: {len(report['places'])}"
     yield f"  faces: {', '.join(f'{count} {kind}' for kind, count in report['kinds'].items())}"
     for name, face in report["faces"].items():
-        yield f"    {name}: {_face_text(face)}"
+        yield f"    {name}: {_format_face(face)}"
     before, after = report["volume_mm3"].values()
     yield f"  volume: {before:.6g} mm^3 in the file, {after:.6g} mm^3 with round walls as fitted"
     yield f"  pieces: {report['pieces']} convex ones, {report['pieces_for_free_shapes']} of them for free shapes"
 
 
-def _face_text(face: Mapping[str, Any]) -> str:
+def _format_face(face: Mapping[str, Any]) -> str:
     """Return the line of one face, from its report."""
     if face["kind"] == "plane":
-        text = f"flat, normal ({_numbers(face['normal'])}), {face['offset_mm']:.6g} mm from the origin"
+        text = f"flat, normal ({_format_numbers(face['normal'])}), {face['offset_mm']:.6g} mm from the origin"
     else:
-        low, high = map(_numbers, face["ends_mm"])
+        low, high = map(_format_numbers, face["ends_mm"])
         sides = f" of {face['sides']} sides" if face["sides"] else ""
-        radii = _numbers(dict.fromkeys(face["radii_mm"]))
+        radii = _format_numbers(dict.fromkeys(face["radii_mm"]))
         text = f"{'hole' if face['hole'] else 'shaft'}, {face['kind']}{sides}, radius {radii} mm"
         text += f", axis from ({low}) to ({high}) mm"
         if face["free_radius_mm"]:
@@ -105,6 +105,6 @@ def _face_text(face: Mapping[str, Any]) -> str:
     return text if face["share"] == 1.0 else f"{text}; {100.0 * face['share']:.3g} % of it can touch"
 
 
-def _numbers(values: Iterable[float], between: str = ", ") -> str:
+def _format_numbers(values: Iterable[float], between: str = ", ") -> str:
     """Return numbers without rounding noise, as text."""
     return between.join(f"{round(float(x), 4) + 0.0:g}" for x in values)

@@ -11,7 +11,7 @@ from apo_bench.importers.cad.solids import SolidPlace, clean_title, make_part_na
 from apo_bench.io import write_file
 
 
-def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
+def name_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
     """Return part, unique name and place of each copy.
 
     Args:
@@ -39,15 +39,15 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
         packed = pose.pack(place.T)
         lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
         lines += [f"title = {json.dumps(clean_title(place.name), ensure_ascii=False)}"] * (name != place.name)
-        lines.append(f"at_mm = {_list(packed[:3])}")
-        lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
+        lines.append(f"at_mm = {_format_list(packed[:3])}")
+        lines.append(f"quaternion_wxyz = {_format_list(packed[3:])}")
         if place.color is not None:
-            lines.append(f"color = {_list(np.round(place.color, 4))}")
+            lines.append(f"color = {_format_list(np.round(place.color, 4))}")
     path = folder / "poses.toml"
     write_file(path, "\n".join(lines) + "\n")
     return path
 
 
-def _list(values: Iterable[float]) -> str:
+def _format_list(values: Iterable[float]) -> str:
     """Return a TOML list of numbers without rounding noise."""
     return "[" + ", ".join(f"{round(float(x), 12) + 0.0:.12g}" for x in values) + "]"

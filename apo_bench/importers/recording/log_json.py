@@ -29,7 +29,7 @@ _ROTATIONS = (
     "q",
 )
 _MATRICES = (
-    "matrix",
+    "make_matrix",
     "pose",
     "transform",
     "T",

@@ -17,7 +17,7 @@ Files = Mapping[str, str]
 """Name -> path of each scenario that was given as a file."""
 
 
-def replay_command(
+def format_replay_command(
     record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS, *, measured: bool = False
 ) -> str:
     """Return `apo-bench run SCENARIO .. --seed N`, quoted for a shell.
@@ -31,24 +31,26 @@ def replay_command(
     """
     if measured:
         drawn = {name: info.default for name, info in SETTINGS.items() if info.drawn or name == "noise"}
-        return without_seed({**record, **drawn}, files, limits)
-    return f"{without_seed(record, files, limits)} --seed {record['seed']}"
+        return format_command_without_seed({**record, **drawn}, files, limits)
+    return f"{format_command_without_seed(record, files, limits)} --seed {record['seed']}"
 
 
-def without_seed(record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
+def format_command_without_seed(
+    record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS
+) -> str:
     """Return a replay command without its seed, which all trials of a condition share."""
     scenario = str((files or {}).get(record["scenario"], record["scenario"]))
     scenario = f"./{scenario}" if scenario.startswith("-") else scenario  # not an option
-    return shlex.join(["apo-bench", "run", scenario, *_options(record, limits)])
+    return shlex.join(["apo-bench", "run", scenario, *_list_options(record, limits)])
 
 
-def _options(record: Mapping[str, Any], limits: Limits) -> list[str]:
+def _list_options(record: Mapping[str, Any], limits: Limits) -> list[str]:
     """Return the options of the settings of a record, other than scenario and seed."""
     words: list[str] = []
 
     def add(option: str, value: object, default: object = None) -> None:
         if value != default:
-            words.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
+            words.extend((f"--{option}", format_number(value) if isinstance(value, float) else str(value)))
 
     measured = record["pose_source"] == DEPTH_CAMERA
     if measured or record["noise_mm"] == record["noise_deg"]:
@@ -61,19 +63,19 @@ def _options(record: Mapping[str, Any], limits: Limits) -> list[str]:
         value = record.get(info.name, info.default)
         if name in _APART or (name == "noise" and measured) or (value == info.default and name not in _ALWAYS):
             continue
-        add(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
+        add(info.option, round_up_to_ms(value) if info.scale != 1.0 else value if info.is_text else float(value))
     add(SETTINGS["secret_seed"].option, _SALT_FILE if record.get("secret_seed") else None)
     if record.get("failure_stage") == "worker":
         add("trial-limit", limits.trial_s)
     return words
 
 
-def number(x: float) -> str:
+def format_number(x: float) -> str:
     """Return the shortest text that is read back as the same number."""
     return str(int(x)) if x == int(x) and abs(x) < 1e15 else repr(x)
 
 
-def milli(seconds: float) -> float:
+def round_up_to_ms(seconds: float) -> float:
     """Convert to thousandths, such that the result times 1e-3 is the same number again, if there is such a number."""
     rounded = float(f"{seconds * 1e3:.12g}")
     return rounded if rounded * 1e-3 == seconds else seconds * 1e3

@@ -10,14 +10,14 @@ from typing import Any
 from apo_bench.errors import InputError, require
 from apo_bench.io import clean, read_bytes, write_file
 from apo_bench.records.limits import USUAL_LIMITS, Limits
-from apo_bench.records.run.validation import run_of
+from apo_bench.records.run.validation import decode_run
 from apo_bench.records.secret_seed import SecretSeed
 
 _RUN = "apo-bench/run/4"
 _LARGEST_BYTES = 16_000_000
 
 
-def run_record(
+def make_run_record(
     grids: Sequence[Mapping[str, Any]],
     content: Mapping[str, str],
     versions: Mapping[str, str],
@@ -63,15 +63,15 @@ def read_run(folder: Path) -> dict[str, Any]:
         InputError: The file cannot be read, or is invalid; the message names file and field.
     """
     path = folder / "run.json"
-    return run_of(read_bytes(path, "run file", _LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
+    return decode_run(read_bytes(path, "run file", _LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
 
 
-def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
+def list_scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
     """Return name -> path of each scenario that was given as a file."""
     return dict(run.get("files") or {})
 
 
-def limits_of(run: Mapping[str, Any]) -> Limits:
+def read_limits(run: Mapping[str, Any]) -> Limits:
     """Return the limits that a sweep had when it was last started; the usual ones if `run.json` states none."""
     limits = {"trial_s": USUAL_LIMITS.trial_s} | (run.get("limits") or {})
     trial_s = limits["trial_s"]
@@ -96,15 +96,15 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     grids = before.get("grids", [])
     count = f"it had {len(grids)} grids, now {len(now['grids'])}" if len(grids) != len(now["grids"]) else ""
     differences = [
-        *(("grid", _difference(old, new, may_grow=True)) for old, new in zip(grids, now["grids"], strict=False)),
-        ("versions", _difference(before.get("versions"), now["versions"])),
-        ("inputs", _difference(before.get("content"), now["content"])),
+        *(("grid", _find_difference(old, new, may_grow=True)) for old, new in zip(grids, now["grids"], strict=False)),
+        ("versions", _find_difference(before.get("versions"), now["versions"])),
+        ("inputs", _find_difference(before.get("content"), now["content"])),
     ]
     why = count or next((f"{what}: {text}" for what, text in differences if text), "")
     require(not why, f"'{folder}' holds trials of another sweep ({why}); choose another folder.")
 
 
-def _difference(before: Any, now: Mapping[str, Any], *, may_grow: bool = False) -> str:
+def _find_difference(before: Any, now: Mapping[str, Any], *, may_grow: bool = False) -> str:
     """Return the first key with another value, and both values, as text; empty if there is none.
 
     Args:

@@ -17,7 +17,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, open_to_append, read_lines
 from apo_bench.records.record import Key, TrialRecord, get_record_key
 from apo_bench.records.run.run_file import check_same, write_run
-from apo_bench.records.run.validation import record_of, unwritable
+from apo_bench.records.run.validation import decode_record, describe_unwritable
 from apo_bench.records.secret_seed import check_same_secret_seed
 
 CHUNK = 1 << 16  # bytes that are read at a time
@@ -36,15 +36,15 @@ class RunFolder:
         """
         self.folder = folder
         self.finished: dict[Key, str] = {}
-        """Key of each trial that has a record -> its `config_hash`."""
+        """Key of each trial that has a record -> its `compute_config_hash`."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with ExitStack() as opened:
                 self._trials = opened.enter_context(open_to_append(folder / "trials.jsonl"))
-                _lock(self._trials.fileno(), folder)
+                _lock_file(self._trials.fileno(), folder)
                 for name in ("trials.jsonl", "timing.jsonl"):
                     _set_torn_line_aside(folder / name)
-                for record in each_record(folder):
+                for record in iterate_records(folder):
                     check_same_secret_seed(f"'{folder}'", run.get("secret_seed"), record["secret_seed"])
                     self.finished[get_record_key(record)] = record["config_hash"]
                 if self.finished:
@@ -71,11 +71,11 @@ class RunFolder:
             file.
         """
         kept = f"the {len(self.finished)} before it are kept"
-        wrong = unwritable(record)
+        wrong = describe_unwritable(record)
         if wrong:
             raise RuntimeError(f"a record is not valid ({wrong}); {kept} in {self.folder}.")
         try:
-            _append(self._trials.fileno(), record)
+            _append_line(self._trials.fileno(), record)
         except OSError as error:
             raise RuntimeError(
                 f"a record could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); {kept}, and the "
@@ -83,7 +83,7 @@ class RunFolder:
             ) from error
         self.finished[get_record_key(record)] = record["config_hash"]
         with suppress(OSError):  # a missing timing does not matter
-            _append(self._timing.fileno(), timing)
+            _append_line(self._timing.fileno(), timing)
 
 
 def read_records(folder: str | Path) -> list[TrialRecord]:
@@ -92,13 +92,13 @@ def read_records(folder: str | Path) -> list[TrialRecord]:
     Raises:
         InputError: There is no such folder, it holds no trials, or a line is no record.
     """
-    return list(each_record(folder))
+    return list(iterate_records(folder))
 
 
-def each_record(folder: str | Path) -> Iterator[TrialRecord]:
+def iterate_records(folder: str | Path) -> Iterator[TrialRecord]:
     """Yield the records of a folder one by one, so that a reader need not hold all of them."""
     path = find_trials(folder)
-    yield from (record_of(line, f"{path}, line {number}") for number, line in read_lines(path, TRIALS_KIND))
+    yield from (decode_record(line, f"{path}, line {number}") for number, line in read_lines(path, TRIALS_KIND))
 
 
 def find_trials(folder: str | Path) -> Path:
@@ -115,7 +115,7 @@ def find_trials(folder: str | Path) -> Path:
     return path
 
 
-def _lock(file: int, folder: Path) -> None:
+def _lock_file(file: int, folder: Path) -> None:
     """Lock a file against other writers until it is closed or the process ends."""
     try:
         import fcntl
@@ -131,7 +131,7 @@ def _lock(file: int, folder: Path) -> None:
         return  # some network file systems cannot lock
 
 
-def _append(file: int, line: Mapping[str, Any]) -> None:
+def _append_line(file: int, line: Mapping[str, Any]) -> None:
     """Append a line; if that fails, remove the part that was written."""
     left = json.dumps(line, allow_nan=False).encode() + b"\n"
     before = os.fstat(file).st_size

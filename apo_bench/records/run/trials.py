@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from apo_bench.geometry import Array
 from apo_bench.io import CONTROL, clean, open_file
 from apo_bench.records.record import RECORD_FIELDS
-from apo_bench.records.run.run_folder import TRIALS_KIND, each_record, find_trials
+from apo_bench.records.run.run_folder import TRIALS_KIND, find_trials, iterate_records
 from apo_bench.records.run.validation import CHECKED, NAMES, decode_kept, find_contradiction
 from apo_bench.records.secret_seed import find_common_secret_seed
 from apo_bench.records.settings import RECORD_SCHEMA, SETTINGS
@@ -41,7 +41,7 @@ _NOT_KEPT = (
 _USUAL = {info.name: info.default for name, info in SETTINGS.items() if name != "scenario"}
 
 
-def _kind(annotation: Any) -> type | None:
+def _column_kind(annotation: Any) -> type | None:
     """Return float, int or bool if a column has such values; None for all other types."""
     info = msgspec.inspect.type_info(annotation)
     kinds = {type(part).__name__ for part in getattr(info, "types", (info,))}
@@ -49,7 +49,7 @@ def _kind(annotation: Any) -> type | None:
 
 
 COLUMNS: Mapping[str, type | None] = {
-    **{name: _kind(annotation) for name, annotation in RECORD_FIELDS.items() if name not in _NOT_KEPT},
+    **{name: _column_kind(annotation) for name, annotation in RECORD_FIELDS.items() if name not in _NOT_KEPT},
     "predicted_fails": bool,
     "predicted_operation": int,
     "predicted_code": None,
@@ -67,7 +67,7 @@ _LEAST_SHARE = 32 * 2**20
 """Fewest bytes for which a process is worthwhile."""
 
 
-class Coded(NamedTuple):
+class CodedColumn(NamedTuple):
     """A column of texts or tuples, each distinct value kept once."""
 
     codes: Index
@@ -76,7 +76,7 @@ class Coded(NamedTuple):
     """The distinct values."""
 
 
-class Groups(NamedTuple):
+class TrialGroups(NamedTuple):
     """Trials, grouped by their values in some columns."""
 
     keys: list[tuple[Any, ...]]
@@ -90,7 +90,7 @@ class Groups(NamedTuple):
 class Trials:
     """Trial records as columns; a part of them shares the columns, so that it needs little memory."""
 
-    columns: Mapping[str, Numbers | Coded]
+    columns: Mapping[str, Numbers | CodedColumn]
     """Column -> its m numbers, with 1 for true, and NaN where a record has no value; or its texts or tuples. A column
     with the same number everywhere has it once, (1,)."""
     count: int
@@ -117,10 +117,10 @@ class Trials:
             return np.full(len(self), column[0], dtype=float)
         return np.asarray(column if self.index is None else column[self.index], dtype=float)
 
-    def coded(self, name: str) -> Coded:
+    def coded(self, name: str) -> CodedColumn:
         """Return a column of texts or tuples."""
         column = self.columns[name]
-        assert isinstance(column, Coded)
+        assert isinstance(column, CodedColumn)
         return column if self.index is None else column._replace(codes=column.codes[self.index])
 
     def is_null(self, name: str) -> Mask:
@@ -137,7 +137,7 @@ class Trials:
 
     def values(self, name: str) -> list[Any]:
         """Return a column as plain values, with None where a record has no value."""
-        if isinstance(self.columns[name], Coded):
+        if isinstance(self.columns[name], CodedColumn):
             codes, names = self.coded(name)
             return [names[code] for code in codes.tolist()]
         kind = COLUMNS[name] or float
@@ -163,7 +163,7 @@ class Trials:
         index = np.arange(self.count, dtype=np.int32) if self.index is None else self.index
         return Trials(self.columns, self.count, index[which])
 
-    def groups(self, names: Iterable[str]) -> Groups:
+    def groups(self, names: Iterable[str]) -> TrialGroups:
         """Group trials by their values in some columns; the order of the groups has no meaning."""
         names = list(names)
         of = np.zeros(len(self), dtype=np.int64)
@@ -173,7 +173,7 @@ class Trials:
                 # combine both numberings into one, renumbered without gaps
                 of = np.unique(of * (int(own.max()) + 1) + own, return_inverse=True)[1]
         first = self.where(np.unique(of, return_index=True)[1])  # the first trial of each group
-        return Groups(list(zip(*(first.values(name) for name in names), strict=True)), of)
+        return TrialGroups(list(zip(*(first.values(name) for name in names), strict=True)), of)
 
     def parts(self, names: Iterable[str]) -> dict[tuple[Any, ...], Trials]:
         """Return values in some columns -> the trials with these values, sorted by seed."""
@@ -186,7 +186,7 @@ class Trials:
     def _codes(self, name: str) -> Index:
         """Return a number for the value of each trial in a column, (n,), from 0."""
         column = self.columns[name]
-        if isinstance(column, Coded):
+        if isinstance(column, CodedColumn):
             return self.coded(name).codes
         if len(column) != self.count:
             return np.zeros(len(self), dtype=np.int32)
@@ -223,7 +223,7 @@ class _Codes(dict[Any, int]):
         return number
 
 
-def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
+def make_trials(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
     """Return records as columns; missing settings have their defaults."""
     if isinstance(records, Trials):
         return records
@@ -251,7 +251,7 @@ def read_trials(folder: str | Path) -> Trials:
             parts = list(pool.map(_read_share, [path] * many, ends, ends[1:]))
     right = [part for part in parts if part is not None]
     # the message names the line
-    return _join(right) if len(right) == len(parts) else trials_of(each_record(folder))
+    return _join(right) if len(right) == len(parts) else make_trials(iterate_records(folder))
 
 
 def _read_share(path: Path, start: int, end: int) -> Trials | None:
@@ -273,7 +273,7 @@ def _read_share(path: Path, start: int, end: int) -> Trials | None:
 
 
 def _is_consistent(trials: Trials) -> bool:
-    """Return whether all records pass the checks of `record_of`, given that they could be decoded."""
+    """Return whether all records pass the checks of `decode_record`, given that they could be decoded."""
     null = np.column_stack([trials.is_null(name) for name in CHECKED])
     success, as_demonstrated = trials.number("success"), trials.number("as_demonstrated") == 1.0
     # few combinations are distinct
@@ -308,7 +308,7 @@ def _batched(items: Iterable[Any]) -> Iterator[list[Any]]:
 def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping[str, Any]]) -> Trials:
     """Return columns of values, with None where a record has no value, and of failure predictions."""
     every = {**values, **{name: [each.get(key) for each in predicted] for name, key in _PREDICTED.items()}}
-    columns: dict[str, Numbers | Coded] = {}
+    columns: dict[str, Numbers | CodedColumn] = {}
     for name, kind in COLUMNS.items():
         own = every.get(name, ())
         if kind is not None:
@@ -318,7 +318,7 @@ def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping
         plain = [tuple(value) if isinstance(value, list) else value for value in own] if name in _LISTS else own
         codes = np.fromiter(map(known.__getitem__, plain), np.int32, len(own))
         names = list(known)
-        columns[name] = Coded(codes, [text and clean(text) for text in names] if name == "sentence" else names)
+        columns[name] = CodedColumn(codes, [text and clean(text) for text in names] if name == "sentence" else names)
     return Trials(columns, len(predicted))
 
 
@@ -334,14 +334,14 @@ def _join(parts: Sequence[Trials]) -> Trials:
     """Return all trials of several parts, in their order."""
     if len(parts) == 1:
         return parts[0]
-    columns: dict[str, Numbers | Coded] = {}
+    columns: dict[str, Numbers | CodedColumn] = {}
     for name, kind in COLUMNS.items():
         own: list[Any] = [part.columns[name] for part in parts]
         if kind is None:
             known = _Codes()
             numbers = [np.array([known[value] for value in each.names], dtype=np.int32) for each in own]
             codes = [to[each.codes] for to, each in zip(numbers, own, strict=True)]
-            columns[name] = Coded(np.concatenate([np.zeros(0, dtype=np.int32), *codes]), list(known))
+            columns[name] = CodedColumn(np.concatenate([np.zeros(0, dtype=np.int32), *codes]), list(known))
         elif own and all(len(each) == 1 for each in own) and _is_equal(np.concatenate(own)):
             columns[name] = own[0]
         else:

@@ -67,7 +67,9 @@ _LARGE = ("thresholds", "conditions", "tried_corrections", "fit_adjustments", "g
 """Columns that tables do not need; without them a record is read in half the time."""
 
 
-def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), **more: Any) -> type[msgspec.Struct]:
+def _make_struct(
+    name: str, fields: Mapping[str, Any], required: Iterable[str] = (), **more: Any
+) -> type[msgspec.Struct]:
     """Return a msgspec type with these fields; those that are not required may be null or missing."""
     columns: list[Any] = [
         (field, kind) if field in required else (field, kind | None, None) for field, kind in fields.items()
@@ -75,17 +77,17 @@ def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), 
     return msgspec.defstruct(name, columns, kw_only=True, gc=False, **more)
 
 
-_RECORD = msgspec.json.Decoder(_struct("TrialRecord", RECORD_FIELDS, REQUIRED))
+_RECORD = msgspec.json.Decoder(_make_struct("TrialRecord", RECORD_FIELDS, REQUIRED))
 _KEPT = {name: kind for name, kind in RECORD_FIELDS.items() if name not in _LARGE}
-decode_kept = msgspec.json.Decoder(_struct("KeptRecord", _KEPT, REQUIRED)).decode
+decode_kept = msgspec.json.Decoder(_make_struct("KeptRecord", _KEPT, REQUIRED)).decode
 """Decodes a line of `trials.jsonl` without its large columns into an object; it raises an error of msgspec."""
-_TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
-_RUN = msgspec.json.Decoder(_struct("Run", RUN_FIELDS))
+_TIMING = msgspec.json.Decoder(_make_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
+_RUN = msgspec.json.Decoder(_make_struct("Run", RUN_FIELDS))
 # for writing, where unknown columns are an error
-_WRITTEN = _struct("Written", RECORD_FIELDS, REQUIRED, forbid_unknown_fields=True)
+_WRITTEN = _make_struct("Written", RECORD_FIELDS, REQUIRED, forbid_unknown_fields=True)
 
 
-def record_of(line: bytes, where: str) -> TrialRecord:
+def decode_record(line: bytes, where: str) -> TrialRecord:
     """Decode and check a line of `trials.jsonl`; return the record with every column, null where the line has none.
 
     Args:
@@ -94,7 +96,7 @@ def record_of(line: bytes, where: str) -> TrialRecord:
     Raises:
         InputError: The line is no record.
     """
-    record = msgspec.structs.asdict(_decode(_RECORD, line, where))
+    record = msgspec.structs.asdict(_decode_line(_RECORD, line, where))
     require(
         record["schema"] == RECORD_SCHEMA,
         f"{where}: a record of schema '{clean(record['schema'])[:60]}' was given; only {RECORD_SCHEMA} can be read.",
@@ -106,28 +108,28 @@ def record_of(line: bytes, where: str) -> TrialRecord:
     return cast(TrialRecord, record)
 
 
-def timing_of(line: bytes, where: str) -> dict[str, Any]:
+def decode_timing(line: bytes, where: str) -> dict[str, Any]:
     """Decode and check a line of `timing.jsonl`.
 
     Raises:
         InputError: The line holds no wall times of a trial.
     """
-    return msgspec.structs.asdict(_decode(_TIMING, line, where))
+    return msgspec.structs.asdict(_decode_line(_TIMING, line, where))
 
 
-def run_of(text: bytes, file: str) -> dict[str, Any]:
+def decode_run(text: bytes, file: str) -> dict[str, Any]:
     """Decode and check `run.json`; return the keys that have a value.
 
     Raises:
         InputError: The text is no such document.
     """
-    run = msgspec.structs.asdict(_decode(_RUN, text, file))
+    run = msgspec.structs.asdict(_decode_line(_RUN, text, file))
     for name, path in (run["files"] or {}).items():
         require(not CONTROL.search(name + path), f"{file}, field files: control characters are not allowed.")
     return {name: value for name, value in run.items() if value is not None}
 
 
-def unwritable(record: Mapping[str, Any]) -> str:
+def describe_unwritable(record: Mapping[str, Any]) -> str:
     """Return why a record may not be written, since reading it would fail; empty if it may."""
     try:
         msgspec.convert(dict(record), _WRITTEN)
@@ -137,7 +139,7 @@ def unwritable(record: Mapping[str, Any]) -> str:
     return _find_fault(record)
 
 
-def _decode(decoder: Any, text: bytes, where: str) -> Any:
+def _decode_line(decoder: Any, text: bytes, where: str) -> Any:
     """Decode a text into an object; errors name the place `where`."""
     try:
         return decoder.decode(text)

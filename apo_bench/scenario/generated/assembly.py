@@ -68,7 +68,7 @@ def draw_length(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.integers(round(2 * low), round(2 * high) + 1)) / 2
 
 
-def split(rng: np.random.Generator, total: int, least: Sequence[int], most: Sequence[int]) -> list[int]:
+def draw_partition(rng: np.random.Generator, total: int, least: Sequence[int], most: Sequence[int]) -> list[int]:
     """Draw whole numbers between bounds with a given sum.
 
     If the upper bounds do not allow the sum, their sum is reached.

@@ -44,7 +44,7 @@ PIN = Pin(0.0, 0.0, 4.5, "pin")
 """The pin on top of a block, for the part that is placed on it."""
 
 
-def box(
+def make_box(
     at: tuple[float, float, float], size: tuple[float, float, float], fit: Sequence[str] = (), **names: str
 ) -> Body:
     """A box of a given size.
@@ -58,27 +58,27 @@ def box(
     return extrude(outline, at[2], at[2] + size[2])
 
 
-def hole(pin: Pin, high: float) -> Bore:
+def make_pin_hole(pin: Pin, high: float) -> Bore:
     """The hole for a pin, from height 0 to `high`."""
     return bore((pin.x, pin.y), pin.radius, 0.0, high, pin.name, fit=True)
 
 
-def block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:
+def make_block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:
     """A block on z = 0, centred about the z axis.
 
     Its faces are `ny`, `px`, `py`, `nx`, `bottom`, `top`, and those of its pins and through holes.
     """
-    bores = [hole(each, height) for each in holes]
+    bores = [make_pin_hole(each, height) for each in holes]
     base = extrude(make_rectangle(width, depth, names=_SIDES), 0, height, bores=bores, bottom="bottom", top="top")
-    return join(base, *(upright(pin, height) for pin in pins)) if pins else base
+    return join(base, *(make_upright_pin(pin, height) for pin in pins)) if pins else base
 
 
-def upright(pin: Pin, low: float) -> Body:
+def make_upright_pin(pin: Pin, low: float) -> Body:
     """A pin with a chamfered tip whose lower end is at height `low`."""
     return make_shaft(pin.radius, low, low + pin.length, pin.name, chamfer_high=1.5).moved((pin.x, pin.y, 0.0))
 
 
-def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
+def make_axle(radius: float, deep: float, collar: float, neck: float) -> Body:
     """A shaft with a collar: `side` below its `shoulder`, `neck` above its `ledge`.
 
     Args:
@@ -107,7 +107,7 @@ def make_ring(outer: float, inner: float, height: float) -> Body:
     )
 
 
-def slotted(length: float, depth: float, height: float, slot: float, floor: float) -> Body:
+def make_slotted_block(length: float, depth: float, height: float, slot: float, floor: float) -> Body:
     """A block with a slot along x, open above: faces `floor`, `slot_n`, `slot_p`."""
     out = depth / 2
     s = slot / 2
@@ -116,10 +116,10 @@ def slotted(length: float, depth: float, height: float, slot: float, floor: floa
         names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
         fit=("slot_p", "slot_n"),
     )  # fmt: skip
-    return along_x(section, length)
+    return extrude_along_x(section, length)
 
 
-def saddle(length: float, depth: float, height: float, slot: float, roof: float) -> Body:
+def make_saddle(length: float, depth: float, height: float, slot: float, roof: float) -> Body:
     """A block with a slot along x, open below: faces `roof`, `slot_n`, `slot_p`, `top`."""
     out = depth / 2
     s = slot / 2
@@ -128,10 +128,10 @@ def saddle(length: float, depth: float, height: float, slot: float, roof: float)
         names={1: "slot_n", 2: "roof", 3: "slot_p", 6: "top"},
         fit=("slot_p", "slot_n"),
     )  # fmt: skip
-    return along_x(section, length)
+    return extrude_along_x(section, length)
 
 
-def upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin) -> Body:
+def make_upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin) -> Body:
     """A wall across x, about x = 0, between two heights, with a hole along x.
 
     Args:
@@ -140,12 +140,14 @@ def upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin)
         hole: Its x is the height of the hole, its y the position along y.
     """
     # Made lying, then turned up about y: -x becomes z, and z becomes x.
-    bored = bore((-hole.x, hole.y), hole.radius, -thick / 2, thick / 2, hole.name, fit=True)
+    bored = bore(
+        (-make_pin_hole.x, make_pin_hole.y), make_pin_hole.radius, -thick / 2, thick / 2, make_pin_hole.name, fit=True
+    )
     lying = extrude(make_rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
     return lying.moved(turn_deg=(0, 90, 0))
 
 
-def rod(radius: float, length: float, grip: float) -> Body:
+def make_rod(radius: float, length: float, grip: float) -> Body:
     """A shaft along x from x = 0, lying on z = 0, with a square head of length `grip` that keeps it from rolling."""
     square = extrude(make_rectangle(2 * radius, 2 * radius), -grip, 0, bottom="end")
     # A groove behind the head, since a shaft as wide as the square would leave slivers of its face.
@@ -157,6 +159,6 @@ def rod(radius: float, length: float, grip: float) -> Body:
     return join(square, revolve(steps, flats={length: "tip"})).moved((0, 0, radius), (0, 90, 0))
 
 
-def along_x(section: Sequence[Edge], length: float) -> Body:
+def extrude_along_x(section: Sequence[Edge], length: float) -> Body:
     """A prism along x, centred at x = 0, with an outline in (y, z)."""
     return extrude(section, -length / 2, length / 2).moved(turn_deg=(90, 0, 90))

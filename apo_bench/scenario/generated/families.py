@@ -5,7 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembly import BOARD, GeneratedAssembly, Station, merge_orders, shift_station, split
+from apo_bench.scenario.generated.assembly import (
+    BOARD,
+    GeneratedAssembly,
+    Station,
+    draw_partition,
+    merge_orders,
+    shift_station,
+)
 from apo_bench.scenario.generated.bodies import TOP
 from apo_bench.scenario.generated.linked import (
     make_bridged,
@@ -26,7 +33,7 @@ _LONGEST = 226.0
 """Largest length of a board, all of which the arm can reach, [mm]."""
 
 
-class Kind(NamedTuple):
+class StationKind(NamedTuple):
     """One kind of station."""
 
     make: Callable[[np.random.Generator, str, int], Station]
@@ -51,26 +58,26 @@ class Family(NamedTuple):
     def draw(self, rng: np.random.Generator) -> GeneratedAssembly:
         """Draw one assembly of the family; drawing is repeated until the board is short enough."""
         stations = list[Station]()
-        while not stations or _length(stations) > _LONGEST:
+        while not stations or _measure_board_length(stations) > _LONGEST:
             size = int(rng.integers(self.sizes[0], self.sizes[1] + 1)) - 1
             count = int(rng.integers(1, _MOST + 1))
             kinds = [_KINDS[self.kinds[int(k)]] for k in rng.integers(len(self.kinds), size=count)]
             least = [kind.least for kind in kinds]
             most = [kind.most for kind in kinds]
             if sum(least) <= size <= sum(most):
-                parts = split(rng, size, least, most)
+                parts = draw_partition(rng, size, least, most)
                 stations = [kind.make(rng, str(i), n) for i, (kind, n) in enumerate(zip(kinds, parts, strict=True), 1)]
         return place_stations(self.title, stations, rng)
 
 
-def _length(stations: Sequence[Station]) -> float:
+def _measure_board_length(stations: Sequence[Station]) -> float:
     """Length of the board that the stations need, [mm]."""
     return sum(station.length for station in stations) + _GAP * (len(stations) - 1) + 2 * _EDGE
 
 
 def place_stations(title: str, stations: Sequence[Station], rng: np.random.Generator) -> GeneratedAssembly:
     """Place stations next to each other on one board, and interleave their operations."""
-    length = _length(stations)
+    length = _measure_board_length(stations)
     placed = list[Station]()
     x = _EDGE - length / 2
     for station in stations:
@@ -91,18 +98,18 @@ def place_stations(title: str, stations: Sequence[Station], rng: np.random.Gener
 
 _MOST = 4
 """Largest number of stations on a board."""
-_KINDS: Mapping[str, Kind] = {
-    "corner": Kind(make_corner, 1, 3),
-    "peg": Kind(make_peg, 1, 2),
-    "post": Kind(make_post, 1, 3),
-    "covered": Kind(make_covered, 3, 9),
-    "pinned": Kind(make_pinned, 3, 5),
-    "bridged": Kind(make_bridged, 3, 9),
-    "keyed": Kind(make_keyed, 3, 6),
-    "grooved": Kind(make_grooved, 3, 6),
-    "carried": Kind(make_carried, 3, 3),
-    "castled": Kind(make_castled, 3, 7),
-    "threaded": Kind(make_threaded, 2, 3),
+_KINDS: Mapping[str, StationKind] = {
+    "corner": StationKind(make_corner, 1, 3),
+    "peg": StationKind(make_peg, 1, 2),
+    "post": StationKind(make_post, 1, 3),
+    "covered": StationKind(make_covered, 3, 9),
+    "pinned": StationKind(make_pinned, 3, 5),
+    "bridged": StationKind(make_bridged, 3, 9),
+    "keyed": StationKind(make_keyed, 3, 6),
+    "grooved": StationKind(make_grooved, 3, 6),
+    "carried": StationKind(make_carried, 3, 3),
+    "castled": StationKind(make_castled, 3, 7),
+    "threaded": StationKind(make_threaded, 2, 3),
 }
 _EVERY = ("corner", "peg", "post", "covered", "pinned", "bridged", "keyed", "grooved", "carried")
 

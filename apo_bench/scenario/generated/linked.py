@@ -13,17 +13,25 @@ from apo_bench.scenario.generated.bodies import (
     PIN,
     TOP,
     Pin,
-    along_x,
-    axle,
-    block,
-    box,
-    rod,
-    saddle,
-    slotted,
-    upright,
-    upright_wall,
+    extrude_along_x,
+    make_axle,
+    make_block,
+    make_box,
+    make_rod,
+    make_saddle,
+    make_slotted_block,
+    make_upright_pin,
+    make_upright_wall,
 )
-from apo_bench.scenario.generated.stations import LETTERS, LOW, WALL, head, hold, make_pile, make_plates
+from apo_bench.scenario.generated.stations import (
+    LETTERS,
+    LOW,
+    WALL,
+    axle_grasp_point,
+    block_grasp_point,
+    make_pile,
+    make_plates,
+)
 from apo_bench.scenario.parts.making import Body, bore, extrude, join, make_polygon, make_rectangle
 
 _FOOT = 32.0
@@ -41,13 +49,13 @@ def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
     plates = list(parts)
     deep = TOP + sum(heights) - LOW
     neck = draw_length(rng, 24, 28)
-    body = axle(radius, deep, radius + draw_length(rng, 4, 5), neck)
+    body = make_axle(radius, deep, radius + draw_length(rng, 4, 5), neck)
     for pin in pins:
         name = f"axle{i}{pin.name}"
         parts[name] = body
         through = [("side", f"{plate}.bore{pin.name}") for plate in plates]
         contacts = (("side", f"{BOARD}.bore{i}{pin.name}"), *through, ("shoulder", f"{plates[-1]}.top"))
-        acts.append(DrawnOperation(name, (pin.x, 0, LOW), contacts, head(deep, neck)))
+        acts.append(DrawnOperation(name, (pin.x, 0, LOW), contacts, axle_grasp_point(deep, neck)))
     bores = [bore((pin.x, 0), radius, 0, TOP, f"bore{i}{pin.name}", fit=True) for pin in pins]
     return Station(width, parts, tuple(acts), bores=tuple(bores))
 
@@ -67,8 +75,8 @@ def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
     for k, x in enumerate(xs):
         name = f"tower{i}{LETTERS[k]}"
         sides = [(-aside, "left")] * (k > 0) + [(aside, "right")] * (k < count - 1)
-        parts[name] = block(width, depth, height, [PIN._replace(x=at, name=side) for at, side in sides])
-        acts.append(DrawnOperation(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), hold(height)))
+        parts[name] = make_block(width, depth, height, [PIN._replace(x=at, name=side) for at, side in sides])
+        acts.append(DrawnOperation(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), block_grasp_point(height)))
     left = size - 2 * count + 1
     for k in range(count - 1):
         name = f"bridge{i}{LETTERS[k]}"
@@ -76,10 +84,10 @@ def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
         ends = [(f"tower{i}{LETTERS[k]}", "right", -1.0), (f"tower{i}{LETTERS[k + 1]}", "left", 1.0)]
         far = pitch / 2 - aside
         holes = [PIN._replace(x=sign * far, name=side) for _, side, sign in ends]
-        parts[name] = block(2 * far + 18, draw_length(rng, 28, 32), thick, [PIN] if caps else [], holes)
+        parts[name] = make_block(2 * far + 18, draw_length(rng, 28, 32), thick, [PIN] if caps else [], holes)
         on = [pair for tower, side, _ in ends for pair in (("bottom", f"{tower}.top"), (side, f"{tower}.{side}"))]
         middle = ((xs[k] + xs[k + 1]) / 2, 0.0, TOP + height)
-        acts.append(DrawnOperation(name, middle, tuple(on), hold(thick)))
+        acts.append(DrawnOperation(name, middle, tuple(on), block_grasp_point(thick)))
         more, piled = make_pile(rng, name, (*middle[:2], middle[2] + thick), caps)
         parts |= more
         acts += piled
@@ -100,27 +108,27 @@ class SlidingPair(NamedTuple):
 
 def make_keyed(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two keys at any place along a slot, a bar over the pins of both, and blocks on the bar."""
-    return _barred(rng, i, size, _slot)
+    return _make_barred_keys(rng, i, size, _draw_slot)
 
 
 def make_grooved(rng: np.random.Generator, i: str, size: int) -> Station:
     """As `make_keyed`, with keys whose tilted faces lie in a groove."""
-    return _barred(rng, i, size, _groove)
+    return _make_barred_keys(rng, i, size, _draw_groove)
 
 
-def _slot(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
+def _draw_slot(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
     """Two upright rails of a given length, and a block as key."""
     width = draw_length(rng, 18, 24)
     height = draw_length(rng, 34, 40)
     low = draw_length(rng, 10, 12)
     rails = (
-        box((0, -(width + WALL) / 2, TOP), (length, WALL, low), fit=("n",), py="n"),
-        box((0, (width + WALL) / 2, TOP), (length, WALL, low), fit=("p",), ny="p"),
+        make_box((0, -(width + WALL) / 2, TOP), (length, WALL, low), fit=("n",), py="n"),
+        make_box((0, (width + WALL) / 2, TOP), (length, WALL, low), fit=("p",), ny="p"),
     )
-    return SlidingPair(rails, block(key_length, width, height, [PIN]), height, (("ny", "n"), ("py", "p")))
+    return SlidingPair(rails, make_block(key_length, width, height, [PIN]), height, (("ny", "n"), ("py", "p")))
 
 
-def _groove(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
+def _draw_groove(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
     """Two rails with faces that lean outwards by a drawn angle, and a key with the same flanks."""
     slope = float(np.tan(np.radians(rng.integers(45, 66))))
     low = draw_length(rng, 11, 13)
@@ -132,18 +140,18 @@ def _groove(rng: np.random.Generator, length: float, key_length: float) -> Slidi
     corners = ((floor, TOP), (far + 3.0, TOP), (far + 3.0, TOP + low), (far, TOP + low))
     mirrored = [(-y, z) for y, z in corners[::-1]]
     rails = (
-        along_x(make_polygon(*corners, names={3: "p"}, fit=("p",)), length),
-        along_x(make_polygon(*mirrored, names={3: "n"}, fit=("n",)), length),
+        extrude_along_x(make_polygon(*corners, names={3: "p"}, fit=("p",)), length),
+        extrude_along_x(make_polygon(*mirrored, names={3: "n"}, fit=("n",)), length),
     )
     section = make_polygon(
         (-floor, 0), (floor, 0), (outer, key_low), (outer, height), (-outer, height), (-outer, key_low),
         names={0: "bottom", 1: "lean_p", 3: "top", 5: "lean_n"},
     )  # fmt: skip
-    key = join(along_x(section, key_length), upright(PIN, height))
+    key = join(extrude_along_x(section, key_length), make_upright_pin(PIN, height))
     return SlidingPair(rails, key, height, (("lean_n", "n"), ("lean_p", "p")))
 
 
-def _barred(
+def _make_barred_keys(
     rng: np.random.Generator, i: str, size: int, way_of: Callable[[np.random.Generator, float, float], SlidingPair]
 ) -> Station:
     """Two keys between the same rails, a bar over both, and blocks on the bar.
@@ -157,14 +165,14 @@ def _barred(
     ends = ((-apart, "a"), (apart, "b"))
     parts = {f"key{i}{end}": way.key for _, end in ends}
     on = (("bottom", f"{BOARD}.top"), *((own, f"{BOARD}.way{i}_{face}") for own, face in way.meets))
-    acts = [DrawnOperation(f"key{i}{end}", (x, 0, TOP), on, hold(way.height)) for x, end in ends]
+    acts = [DrawnOperation(f"key{i}{end}", (x, 0, TOP), on, block_grasp_point(way.height)) for x, end in ends]
     thick = draw_length(rng, 14, 16)
     z = TOP + way.height
     bar = f"bar{i}"
     holes = [PIN._replace(x=x, name=f"bore{end}") for x, end in ends]
-    parts[bar] = block(2 * apart + 20, draw_length(rng, 24, 30), thick, [PIN] if size > 3 else [], holes)
+    parts[bar] = make_block(2 * apart + 20, draw_length(rng, 24, 30), thick, [PIN] if size > 3 else [], holes)
     pairs = [pair for _, e in ends for pair in (("bottom", f"key{i}{e}.top"), (f"bore{e}", f"key{i}{e}.pin"))]
-    acts.append(DrawnOperation(bar, (0, 0, z), tuple(pairs), hold(thick)))
+    acts.append(DrawnOperation(bar, (0, 0, z), tuple(pairs), block_grasp_point(thick)))
     more, piled = make_pile(rng, bar, (0, 0, z + thick), size - 3)
     rails = tuple(rail.prefixed(f"way{i}_") for rail in way.rails)
     return Station(2 * apart + length + 6, parts | more, (*acts, *piled), bodies=rails)
@@ -179,7 +187,7 @@ def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
     height = draw_length(rng, 46, 52)
     floor = draw_length(rng, 20, 24)
     over = draw_length(rng, 20, 25)
-    body = slotted(length, draw_length(rng, 40, 44), height, slot, floor)
+    body = make_slotted_block(length, draw_length(rng, 40, 44), height, slot, floor)
     xs = [pitch * (k - (count - 1) / 2) for k in range(count)]
     names = [f"castle{i}{LETTERS[k]}" for k in range(count)]
     parts = dict.fromkeys(names, body)
@@ -190,7 +198,7 @@ def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
     ]
     stick = f"stick{i}"
     high = height - floor + over
-    parts[stick] = block(pitch * (count - 1) + length + draw_length(rng, 4, 16), slot, high)
+    parts[stick] = make_block(pitch * (count - 1) + length + draw_length(rng, 4, 16), slot, high)
     on = [
         pair
         for name in names
@@ -200,7 +208,7 @@ def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
     roof = over - 2.0
     for k in range(size - count - 1):
         name = f"saddle{i}{LETTERS[k]}"
-        parts[name] = saddle(draw_length(rng, 28, 34), slot + 20, roof + 16, slot, roof)
+        parts[name] = make_saddle(draw_length(rng, 28, 34), slot + 20, roof + 16, slot, roof)
         meets = (("roof", f"{stick}.top"), ("slot_n", f"{stick}.ny"), ("slot_p", f"{stick}.py"))
         acts.append(
             DrawnOperation(name, (xs[k], 0, TOP + floor + high - roof), meets, (0, 0, roof + 6), vary_mm=(("x", 3.0),))
@@ -219,11 +227,12 @@ def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
     top = high + radius + 14
     first = -pitch * count / 2
     wall = join(
-        box((0, 0, 0), (thick, depth, 10.0)), upright_wall(thick, depth, 10, top, Pin(high, 0, radius, f"bore{i}"))
+        make_box((0, 0, 0), (thick, depth, 10.0)),
+        make_upright_wall(thick, depth, 10, top, Pin(high, 0, radius, f"bore{i}")),
     )
     bracket = join(
         extrude(make_rectangle(_FOOT + thick, depth, (_FOOT / 2, 0)), 0, 10, bottom="bottom", top="tread"),
-        upright_wall(thick, depth, 10, top, Pin(high, 0, radius, "bore")),
+        make_upright_wall(thick, depth, 10, top, Pin(high, 0, radius, "bore")),
     )
     names = [f"bracket{i}{LETTERS[k]}" for k in range(count)]
     parts = dict.fromkeys(names, bracket)
@@ -238,7 +247,7 @@ def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
         for k, name in enumerate(names)
     ]
     stick = f"rod{i}"
-    parts[stick] = rod(radius, pitch * count + thick + 20, 24)
+    parts[stick] = make_rod(radius, pitch * count + thick + 20, 24)
     through = [("side", f"{BOARD}.bore{i}"), *(("side", f"{name}.bore") for name in names)]
     at = (first - thick / 2 - 8, 0.0, TOP + high - radius)
     acts.append(DrawnOperation(stick, at, tuple(through), (-12, 0, radius + 4), vary_mm=(("x", 2.0),)))

@@ -10,8 +10,8 @@ import numpy as np
 from apo_bench.errors import InputError, require_known
 from apo_bench.scenario.generated.assembly import GeneratedAssembly
 from apo_bench.scenario.generated.families import FAMILIES
-from apo_bench.scenario.generated.table_layout import lay
-from apo_bench.scenario.generated.writing import write
+from apo_bench.scenario.generated.table_layout import lay_out_table
+from apo_bench.scenario.generated.writing import write_assembly
 
 _PREFIX = "generated:"
 _FAMILY_STREAM = 40
@@ -59,13 +59,13 @@ def make_generated_file(name: str) -> Path:
 @lru_cache(maxsize=1024)
 def _write_once(name: str) -> Path:
     """Write the files of a complete name at the first call, and return the path of the scenario file."""
-    folder = Path(_folder().name) / name.replace(":", "_")
+    folder = Path(_get_temporary_folder().name) / name.replace(":", "_")
     folder.mkdir()
     return write_generated(name, folder)
 
 
 @lru_cache(maxsize=1)
-def _folder() -> tempfile.TemporaryDirectory[str]:
+def _get_temporary_folder() -> tempfile.TemporaryDirectory[str]:
     """The temporary folder of this process."""
     return tempfile.TemporaryDirectory(prefix="apo_bench_")
 
@@ -73,7 +73,7 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
 def write_generated(name: str, folder: Path) -> Path:
     """Write the files of a generated assembly, and return the path of the scenario file."""
     assembly, rng = generate_assembly(name)
-    return write(assembly, lay(assembly, rng), folder, "_".join(complete_name(name).split(":")[1:]))
+    return write_assembly(assembly, lay_out_table(assembly, rng), folder, "_".join(complete_name(name).split(":")[1:]))
 
 
 def generate_assembly(name: str) -> tuple[GeneratedAssembly, np.random.Generator]:

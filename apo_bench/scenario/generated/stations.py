@@ -9,7 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.scenario.generated.assembly import BOARD, DrawnOperation, Point, Station, draw_length
-from apo_bench.scenario.generated.bodies import COLLAR, PIN, TOP, Pin, axle, block, box, make_ring, upright
+from apo_bench.scenario.generated.bodies import (
+    COLLAR,
+    PIN,
+    TOP,
+    Pin,
+    make_axle,
+    make_block,
+    make_box,
+    make_ring,
+    make_upright_pin,
+)
 from apo_bench.scenario.parts.making import Body, bore
 
 LETTERS = "abcdefghijkl"
@@ -22,13 +32,13 @@ _LOOSE = 0.5
 """Probability that the top block lies loose on the one below, without a pin."""
 
 
-def hold(height: float) -> Point:
+def block_grasp_point(height: float) -> Point:
     """The grasp point of a block of this height, so that the fingers stay above its bottom."""
     return (0.0, 0.0, height - 2.0 if height < 22.0 else height - 10.0)
 
 
-def head(deep: float, neck: float) -> Point:
-    """The grasp point of an axle, at the end of its neck; arguments as in `axle`."""
+def axle_grasp_point(deep: float, neck: float) -> Point:
+    """The grasp point of an axle, at the end of its neck; arguments as in `make_axle`."""
     return (0.0, 0.0, deep + COLLAR + neck - 10.0)
 
 
@@ -39,14 +49,14 @@ def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
     height = draw_length(rng, 38, 44)
     low = draw_length(rng, 10, 14)
     walls = (
-        box((-(width + WALL) / 2, 0, TOP), (WALL, depth, low), px=f"wall{i}x"),
-        box((0, (depth + WALL) / 2, TOP), (width, WALL, low), ny=f"wall{i}y"),
+        make_box((-(width + WALL) / 2, 0, TOP), (WALL, depth, low), px=f"wall{i}x"),
+        make_box((0, (depth + WALL) / 2, TOP), (width, WALL, low), ny=f"wall{i}y"),
     )
     name = f"block{i}"
     contacts = (("bottom", f"{BOARD}.top"), ("nx", f"{BOARD}.wall{i}x"), ("py", f"{BOARD}.wall{i}y"))
-    acts = (DrawnOperation(name, (0, 0, TOP), contacts, hold(height)),)
+    acts = (DrawnOperation(name, (0, 0, TOP), contacts, block_grasp_point(height)),)
     is_loose = size > 1 and bool(rng.random() < _LOOSE)
-    parts = {name: block(width, depth, height, [PIN] if size - is_loose > 1 else [])}
+    parts = {name: make_block(width, depth, height, [PIN] if size - is_loose > 1 else [])}
     more, piled = make_pile(rng, name, (0, 0, TOP + height), size - 1, is_loose)
     return Station(width + 2 * WALL, parts | more, (*acts, *piled), bodies=walls)
 
@@ -72,10 +82,12 @@ def make_pile(
         is_loose = loose and (k == count - 1)
         pins = [PIN] if k < count - 1 - loose else []
         holes = [] if is_loose else [PIN._replace(name="bore")]
-        parts[name] = block(draw_length(rng, 30, 36), draw_length(rng, 28, 32), height, pins, holes)
+        parts[name] = make_block(draw_length(rng, 30, 36), draw_length(rng, 28, 32), height, pins, holes)
         on = (("bottom", f"{below}.top"), *(() if is_loose else (("bore", f"{below}.pin"),)))
         acts.append(
-            DrawnOperation(name, (x, y, z), on, hold(height), vary_mm=(("x", 3.0), ("y", 2.0)) if is_loose else ())
+            DrawnOperation(
+                name, (x, y, z), on, block_grasp_point(height), vary_mm=(("x", 3.0), ("y", 2.0)) if is_loose else ()
+            )
         )
         below = name
         z += height
@@ -104,14 +116,17 @@ def make_ringed_axle(
     neck = height + draw_length(rng, 24, 28)
     name = f"axle{i}"
     parts = {
-        name: axle(radius, deep, collar, neck),
+        name: make_axle(radius, deep, collar, neck),
         f"ring{i}": make_ring(draw_length(rng, collar + 4, 20), radius, height),
     }
     contacts = (("side", f"{BOARD}.bore{i}"), ("shoulder", f"{BOARD}.top"))
     return parts, (
-        DrawnOperation(name, (0, 0, LOW), contacts, head(deep, neck)),
+        DrawnOperation(name, (0, 0, LOW), contacts, axle_grasp_point(deep, neck)),
         DrawnOperation(
-            f"ring{i}", (0, 0, TOP + COLLAR), (("bore", f"{name}.neck"), ("low", f"{name}.ledge")), hold(height)
+            f"ring{i}",
+            (0, 0, TOP + COLLAR),
+            (("bore", f"{name}.neck"), ("low", f"{name}.ledge")),
+            block_grasp_point(height),
         ),
     )
 
@@ -129,7 +144,7 @@ def make_post(rng: np.random.Generator, i: str, size: int) -> Station:
     parts, acts = make_plates(rng, i, width, (30, 40), heights, posts)
     on = tuple((f"bore{pin.name[-1]}", f"{BOARD}.{pin.name}") for pin in posts)
     threaded = (act._replace(contacts=(*act.contacts, *on)) for act in acts)
-    return Station(width, parts, tuple(threaded), bodies=tuple(upright(each, TOP) for each in posts))
+    return Station(width, parts, tuple(threaded), bodies=tuple(make_upright_pin(each, TOP) for each in posts))
 
 
 def make_plates(
@@ -155,8 +170,8 @@ def make_plates(
     below = f"{BOARD}.top"
     for k, height in enumerate(heights):
         name = f"plate{i}{LETTERS[k]}"
-        parts[name] = block(width, draw_length(rng, *depth), height, holes=holes)
-        acts.append(DrawnOperation(name, (0, 0, z), (("bottom", below),), hold(height)))
+        parts[name] = make_block(width, draw_length(rng, *depth), height, holes=holes)
+        acts.append(DrawnOperation(name, (0, 0, z), (("bottom", below),), block_grasp_point(height)))
         below = f"{name}.top"
         z += height
     return parts, acts
@@ -174,25 +189,30 @@ def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
     high = draw_length(rng, 14, 16)
     deep = TOP - LOW
     neck = thick + high + draw_length(rng, 24, 28)
-    body = axle(radius, deep, collar, neck)
+    body = make_axle(radius, deep, collar, neck)
     names = [f"axle{i}{LETTERS[k]}" for k in range(count)]
     parts: dict[str, Body] = dict.fromkeys(names, body)
     acts = [
         DrawnOperation(
-            name, (x, 0, LOW), (("side", f"{BOARD}.bore_{name}"), ("shoulder", f"{BOARD}.top")), head(deep, neck)
+            name,
+            (x, 0, LOW),
+            (("side", f"{BOARD}.bore_{name}"), ("shoulder", f"{BOARD}.top")),
+            axle_grasp_point(deep, neck),
         )
         for name, x in zip(names, xs, strict=True)
     ]
     cover = f"cover{i}"
     holes = [Pin(x, 0, radius, f"bore_{name}") for name, x in zip(names, xs, strict=True)]
-    parts[cover] = block(pitch * (count - 1) + 40, draw_length(rng, 32, 40), thick, holes=holes)
+    parts[cover] = make_block(pitch * (count - 1) + 40, draw_length(rng, 32, 40), thick, holes=holes)
     on = [pair for name in names for pair in (("bottom", f"{name}.ledge"), (f"bore_{name}", f"{name}.neck"))]
-    acts.append(DrawnOperation(cover, (0, 0, TOP + COLLAR), tuple(on), hold(thick)))
+    acts.append(DrawnOperation(cover, (0, 0, TOP + COLLAR), tuple(on), block_grasp_point(thick)))
     disc = make_ring(draw_length(rng, radius + 8, 20), radius, high)
     for k in sorted(ringed):
         meets = (("bore", f"{names[k]}.neck"), ("low", f"{cover}.top"))
         parts[f"ring{i}{LETTERS[k]}"] = disc
-        acts.append(DrawnOperation(f"ring{i}{LETTERS[k]}", (xs[k], 0, TOP + COLLAR + thick), meets, hold(high)))
+        acts.append(
+            DrawnOperation(f"ring{i}{LETTERS[k]}", (xs[k], 0, TOP + COLLAR + thick), meets, block_grasp_point(high))
+        )
     bores = tuple(bore((x, 0), radius, 0, TOP, f"bore_{name}", fit=True) for name, x in zip(names, xs, strict=True))
     return Station(pitch * (count - 1) + 46, parts, tuple(acts), bores=bores)
 
@@ -209,6 +229,6 @@ def make_carried(rng: np.random.Generator, i: str, size: int) -> Station:
         second._replace(at=(0, aside, second.at[2])),
         first._replace(carries=(second.part,)),
     )
-    parts[stand] = block(40, 40, TOP, holes=[Pin(0, 0, radius, "bore")])
+    parts[stand] = make_block(40, 40, TOP, holes=[Pin(0, 0, radius, "bore")])
     bores = (bore((0, 0), radius, 0, TOP, f"bore{i}", fit=True),)
     return Station(50.0, parts, acts, bores=bores, fixed={stand: (0.0, aside, 0.0)})

@@ -44,14 +44,14 @@ class TableLayout(NamedTuple):
     """Largest rotation of the site, in either direction."""
 
 
-def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
+def lay_out_table(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
     """Draw the start positions of all movable parts, the longest along x first.
 
     Raises:
         RuntimeError: There is no room for all parts.
     """
     # Radius of the disc that the fixed parts cover at any rotation.
-    corners = np.concatenate([_box(made.parts[part]) + at[:2] for part, at in made.fixed.items()])
+    corners = np.concatenate([_bounding_rectangle(made.parts[part]) + at[:2] for part, at in made.fixed.items()])
     reach = float(np.hypot(*np.abs(corners).max(axis=0)))
     spread = (float(np.clip(150.0 - reach, *_SPREAD_X)), float(np.clip(150.0 - reach, *_SPREAD_Y)))
     yaw = np.radians(_YAW_DEG)
@@ -62,11 +62,12 @@ def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
     starts = dict[str, tuple[float, float, float]]()
     movable = [part for part in made.parts if part not in made.fixed]
     for part in sorted(
-        rng.permutation(movable).tolist(), key=lambda part: -float(np.ptp(_box(made.parts[part]), axis=0)[0])
+        rng.permutation(movable).tolist(),
+        key=lambda part: -float(np.ptp(_bounding_rectangle(made.parts[part]), axis=0)[0]),
     ):
-        low, high = _box(made.parts[part])
+        low, high = _bounding_rectangle(made.parts[part])
         size = (high - low) / 2
-        places = _grid() + rng.uniform(-_GRID / 2, _GRID / 2, 2)
+        places = _list_grid_places() + rng.uniform(-_GRID / 2, _GRID / 2, 2)
         free = np.ones(len(places), dtype=np.bool_)
         for a, b in taken:
             room = _ROOM if a is not taken[0][0] else 0.0
@@ -79,7 +80,7 @@ def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
     return TableLayout(starts, (_CENTER, 0.0), spread, _YAW_DEG)
 
 
-def _grid() -> Array:
+def _list_grid_places() -> Array:
     """Candidate start positions (k, 2) within reach on both sides of the site, the nearest to it first."""
     x, y = np.meshgrid(np.arange(-130.0, 190.0, _GRID), np.arange(-400.0, 401.0, _GRID), indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
@@ -88,7 +89,7 @@ def _grid() -> Array:
     return places[np.argsort(np.hypot(places[:, 0] - 20.0, places[:, 1]), kind="stable")]
 
 
-def _box(body: Body) -> Array:
+def _bounding_rectangle(body: Body) -> Array:
     """Lowest and highest corner (x, y) of a body in the top view, as rows, (2, 2)."""
     corners = np.concatenate([piece.corners for piece in body.pieces])[:, :2]
     return np.asarray(1e3 * np.array([corners.min(axis=0), corners.max(axis=0)]))

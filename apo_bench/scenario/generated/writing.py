@@ -30,27 +30,27 @@ _COLORS = (
 )
 
 
-def write(made: GeneratedAssembly, table: TableLayout, folder: Path, name: str) -> Path:
+def write_assembly(made: GeneratedAssembly, table: TableLayout, folder: Path, name: str) -> Path:
     """Write the part files and the scenario file of an assembly; return the path of the scenario file."""
-    files = _stems(made.parts)
+    files = _list_file_names(made.parts)
     for part, stem in files.items():
         if part == stem:
             write_part(
                 part, made.parts[part], folder, density=_DENSITY, friction=_FRICTION, source=_SOURCE, licence=_LICENCE
             )
     path = folder / f"{name}.toml"
-    write_file(path, format_toml(_document(made, table, files)))
+    write_file(path, format_toml(_make_document(made, table, files)))
     return path
 
 
-def _stems(parts: Mapping[str, Body]) -> Mapping[str, str]:
+def _list_file_names(parts: Mapping[str, Body]) -> Mapping[str, str]:
     """Part -> name of its part file, which is the first part with the same body."""
     first: dict[int, str] = {}
     return {name: first.setdefault(id(body), name) for name, body in parts.items()}
 
 
-def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, str]) -> dict[str, Any]:
-    """The content of the scenario file; `files` is the result of `_stems`."""
+def _make_document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, str]) -> dict[str, Any]:
+    """The content of the scenario file; `files` is the result of `_list_file_names`."""
     parts: dict[str, Any] = {"table": {"file": "table", "fixed": True}}
     for k, part in enumerate(made.parts):
         is_fixed = part in made.fixed
@@ -68,7 +68,7 @@ def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, s
         "clearance_mm": 0.25,
         "gap_mm": 0.1,
         "parts": parts,
-        "operations": [_operation(act) for act in made.acts],
+        "operations": [_make_operation_entry(act) for act in made.acts],
         "site": {
             "center_mm": _round_lengths(table.center),
             "spread_mm": _round_lengths(table.spread),
@@ -77,7 +77,7 @@ def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, s
     }
 
 
-def _operation(act: DrawnOperation) -> dict[str, Any]:
+def _make_operation_entry(act: DrawnOperation) -> dict[str, Any]:
     """The entry of `[[operations]]`."""
     return {
         "move": act.part,

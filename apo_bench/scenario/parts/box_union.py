@@ -45,9 +45,9 @@ class UnnamedFace(NamedTuple):
 
     def rings(self) -> tuple[Array, ...]:
         """Its outline, counter-clockwise as seen from outside, then its holes, clockwise; (k, 3) each, [m]."""
-        return tuple(map(self._lifted, list_rings(self.shape, self.sign)))
+        return tuple(map(self._lift_ring, list_rings(self.shape, self.sign)))
 
-    def _lifted(self, ring: Array) -> Array:
+    def _lift_ring(self, ring: Array) -> Array:
         """A ring in its plane as points (k, 3), beginning with the lowest corner."""
         flat = straighten(ring)
         flat = np.roll(flat, -np.lexsort(flat.T[::-1])[0], axis=0)
@@ -78,23 +78,23 @@ def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
     """
     from scipy.ndimage import label
 
-    grid = [_planes(boxes, axis) for axis in range(3)]
-    full = _full_cells(boxes, grid)
+    grid = [_list_side_coordinates(boxes, axis) for axis in range(3)]
+    full = _mark_full_cells(boxes, grid)
     volumes = np.einsum("i,j,k,ijk->ijk", *(np.diff(planes) for planes in grid), full)
     volume = float(volumes.sum())
     middles = [(planes[1:] + planes[:-1]) / 2 for planes in grid]
     centroid = [np.moveaxis(volumes, axis, 0).sum(axis=(1, 2)) @ middles[axis] / volume for axis in range(3)]
-    surfaces = sorted(islice(_surfaces(full, grid), most), key=lambda s: (s.side, s.height, s.shape.bounds))
+    surfaces = sorted(islice(_list_surfaces(full, grid), most), key=lambda s: (s.side, s.height, s.shape.bounds))
     return Union(tuple(surfaces), np.array(centroid), volume, int(label(full)[1]))
 
 
-def _planes(boxes: Sequence[Box], axis: int) -> Array:
+def _list_side_coordinates(boxes: Sequence[Box], axis: int) -> Array:
     """The coordinates of all sides along an axis, ascending, each once, [m]."""
     sides = np.sort([box.center[axis] + sign * box.half[axis] for box in boxes for sign in (-1, 1)])
     return np.round(sides[np.diff(sides, prepend=-np.inf) > _SAME_PLANE_M], 12)
 
 
-def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_]:
+def _mark_full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_]:
     """(cells along x, y, z), True for each cell of the grid that lies in a box."""
     full = np.zeros([len(planes) - 1 for planes in grid], dtype=np.bool_)
     for box in boxes:
@@ -108,14 +108,14 @@ def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_
     return full
 
 
-def _runs(bare: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
+def _find_runs(bare: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
     """Find the runs of True in the rows of a mask: row, first column, column after the last one, (n,) each."""
     # A run begins where the padded row steps up, and ends where it steps down.
     ends = np.diff(np.pad(bare, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     return *np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
 
 
-def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[UnnamedFace]:
+def _list_surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[UnnamedFace]:
     """Yield every face: rectangles between full and empty cells, per plane, joined where they share an edge."""
     import shapely
 
@@ -128,6 +128,6 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Unname
         for k, layer in enumerate(layers):
             beyond = k + 1 if forward else k - 1
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
-            row, begin, end = _runs(bare)
+            row, begin, end = _find_runs(bare)
             for piece in list_polygons(shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))):
                 yield UnnamedFace(side, float(grid[axis][k + forward]), piece)

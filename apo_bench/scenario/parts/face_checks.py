@@ -66,7 +66,7 @@ def check_faces(solid: Solid, path: Path) -> float:
     return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
 
 
-def _near(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
+def _find_near_pieces(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
     """The pieces whose bounding box meets the bounding box of points (k, 3), enlarged by a margin."""
     low = corners.min(axis=0) - margin
     high = corners.max(axis=0) + margin
@@ -79,24 +79,26 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
 
     n = face.normal
     to_plane = find_plane_across(face.normal)
-    near = _near(pieces, face.outline, _ABOVE_M)
+    near = _find_near_pieces(pieces, face.outline, _ABOVE_M)
     stated = make_flat_area(face.outline, face.holes, to_plane)
-    below = _below(face, near, to_plane)
+    below = _list_sides_below(face, near, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
         at = bare.representative_point()
         x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)
-        _fail(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+        _raise_fault(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
     commons = [common for area in below if (common := stated.intersection(area)).area >= _BESIDE_M**2]
     within = [[at.x, at.y] for at in (common.representative_point() for common in commons)]
     points = np.array(within).reshape(-1, 2) @ to_plane.T + (n @ face.outline[0] + _ABOVE_M) * n
     depths = np.array([measure_depth_inside(piece, points) for piece in near])
     for k in np.flatnonzero((depths > _ROUNDED_M).any(axis=0)):
         x, y, z = 1e3 * points[k]
-        _fail(place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+        _raise_fault(
+            place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm"
+        )
 
 
-def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
+def _list_sides_below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
     """The sides of pieces that lie in the plane of a face and look its way, as shapely areas.
 
     Args:
@@ -104,20 +106,20 @@ def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
     """
     height = face.normal @ face.outline[0]
     return [
-        _shadow(piece, side, to_plane)
+        _project_side(piece, side, to_plane)
         for piece in pieces
         for side in piece.planes[np.abs(piece.planes[:, 3] - height) < 2.0 * _IN_PLANE_M]
         if side[:3] @ face.normal > 1.0 - _PARALLEL
     ]
 
 
-def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
+def find_supported_area(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
     """The part of a flat face that lies on sides of pieces, and its fraction of the area; None if not one area."""
     import shapely
 
     to_plane = find_plane_across(face.normal)
     stated = shapely.make_valid(make_flat_area(face.outline, face.holes, to_plane))
-    lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
+    lying = stated.intersection(shapely.unary_union(_list_sides_below(face, pieces, to_plane), grid_size=_SNAP_M))
     # Shrinking and growing removes slivers; the sum of the offsets is 0.
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
@@ -133,7 +135,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     return Face(face.name, oriented[0], tuple(oriented[1:])), float(lying.area / stated.area)
 
 
-def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
+def _project_side(piece: Piece, side: Array, to_plane: Array) -> Any:
     """A side of a piece, a row (4,) of its planes, as a shapely area."""
     from shapely import MultiPoint
 
@@ -149,16 +151,16 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
     Returns:
         Largest volume between the wall and the sides of the pieces, [m^3].
     """
-    heights, radii = _samples(wall)
+    heights, radii = _sample_wall(wall)
     angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if wall.toward is None else 0.5))
-    near = _near(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
+    near = _find_near_pieces(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
     if not near:
-        _fail(place, "no piece is near the face")
+        _raise_fault(place, "no piece is near the face")
     near_wall = 0
     off = 0.0
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
     for height, radius in zip(heights, radii, strict=True):
-        enter, leave = _crossed(near, wall.point + height * wall.axis, wall.around(angle))
+        enter, leave = _intersect_pieces(near, wall.point + height * wall.axis, wall.around(angle))
         sign = 1.0 if wall.hole else -1.0  # the material is outside of a hole, inside of a shaft
         free = sorted((radius - sign * _BESIDE_M, radius - sign * max(_NEAR * radius, 2.0 * _BESIDE_M)))
         into = (np.minimum(leave, free[1]) - np.maximum(enter, free[0]) > _ROUNDED_M).any(axis=0)
@@ -170,12 +172,14 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
         if into.any():
             true = np.abs(at[into][0])
             where = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
-            _fail(place, f"pieces have a side {where}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm")
+            _raise_fault(
+                place, f"pieces have a side {where}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm"
+            )
         gap = np.maximum(sign * (at - radius), 0.0)
         near_wall += int((gap <= allowed).sum())
         off = max(off, float(gap[gap <= allowed].max(initial=0.0)))
     if near_wall < _LEAST_WALL * _RAYS * len(heights):
-        _fail(
+        _raise_fault(
             place,
             f"pieces lie along {near_wall / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
             f"{_LEAST_WALL:.0%} is needed",
@@ -200,7 +204,7 @@ def check_receding(solid: Solid, path: Path) -> None:
             ) from error
 
 
-def _samples(wall: RoundFace) -> tuple[Array, Array]:
+def _sample_wall(wall: RoundFace) -> tuple[Array, Array]:
     """Heights of the rays along the axis of a wall, and its radii there, (k,) each; for a rim just inside the part."""
     if wall.kind == "rim":
         return np.array([wall.span[0] - _ROUNDED_M]), np.array([wall.radius])
@@ -208,13 +212,13 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
     return heights, wall.radii[0] + wall.slope * (heights - wall.span[0])
 
 
-def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
+def _intersect_pieces(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
     """Distances at which rays `out` (r, 3) enter and leave each piece, (pieces, r) each; inf and -inf for a miss."""
     enter, leave = np.array([intersect_rays(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
     behind = leave <= 0.0
     return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
 
 
-def _fail(place: str, what: str) -> NoReturn:
+def _raise_fault(place: str, what: str) -> NoReturn:
     """Raise an `InputError` with the remedy."""
     raise InputError(f"{place}: {what}; state the face as the pieces are, or correct the pieces.")

@@ -9,7 +9,7 @@ from apo_bench.geometry import Face, RoundFace, Solid, recede_pieces
 from apo_bench.scenario.parts.face_checks import check_receding
 
 
-def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
+def mark_fit_faces(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
     """Mark faces of a solid as fit, after moving each of them into the solid by its undersize.
 
     For example, an undersize of 0.05 mm per side makes a wall fit between two walls that are 0.1 mm too near to each
@@ -35,14 +35,14 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
     fitted = replace(
         solid,
         pieces=pieces,
-        faces={name: _flat(face, undersizes_mm.get(name)) for name, face in solid.faces.items()},
-        rounds={name: _wall(face, undersizes_mm.get(name)) for name, face in solid.rounds.items()},
+        faces={name: _recede_flat(face, undersizes_mm.get(name)) for name, face in solid.faces.items()},
+        rounds={name: _recede_wall(face, undersizes_mm.get(name)) for name, face in solid.rounds.items()},
     )
     check_receding(fitted, Path(solid.name))
     return fitted
 
 
-def _flat(face: Face, by_mm: float | None) -> Face:
+def _recede_flat(face: Face, by_mm: float | None) -> Face:
     """The face moved into the part and marked as fit; unchanged if `by_mm` is None."""
     if by_mm is None:
         return face
@@ -50,7 +50,7 @@ def _flat(face: Face, by_mm: float | None) -> Face:
     return replace(face, outline=face.outline + off, holes=tuple(hole + off for hole in face.holes), fit=True)
 
 
-def _wall(face: RoundFace, by_mm: float | None) -> RoundFace:
+def _recede_wall(face: RoundFace, by_mm: float | None) -> RoundFace:
     """The wall moved into the part and marked as fit; unchanged if `by_mm` is None."""
     if by_mm is None:
         return face

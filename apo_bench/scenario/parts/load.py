@@ -48,7 +48,7 @@ def load_part(given: str | Path, checked: bool = True) -> Solid:
         InputError: The file breaks a rule; the message names file, element and remedy.
     """
     file = read_part(find_part_path(given))
-    solid = _stated(file, file.stated) if file.stated else _united(file)
+    solid = _build_stated_solid(file, file.stated) if file.stated else _build_box_union(file)
     mass = file.density * solid.volume
     require(
         LIGHTEST_KG <= mass <= HEAVIEST_KG,
@@ -60,7 +60,7 @@ def load_part(given: str | Path, checked: bool = True) -> Solid:
     return solid
 
 
-def _stated(file: PartFile, stated: StatedPart) -> Solid:
+def _build_stated_solid(file: PartFile, stated: StatedPart) -> Solid:
     """The solid of convex pieces, with the faces, volume, centroid and inertia of its TOML file."""
     return Solid(
         file.path.stem,
@@ -73,7 +73,7 @@ def _stated(file: PartFile, stated: StatedPart) -> Solid:
     )
 
 
-def _united(file: PartFile) -> Solid:
+def _build_box_union(file: PartFile) -> Solid:
     """The solid of a part of boxes: their union, with faces named by its sites."""
     boxes = tuple(piece for piece in file.pieces if isinstance(piece, Box))
     union = unite(boxes, MOST_FACES + 1)
@@ -86,7 +86,7 @@ def _united(file: PartFile) -> Solid:
     )
     marks = dict[int, NamedSite]()
     for each in file.marks:
-        k = _under(file, each, union.surfaces)
+        k = _find_surface_under(file, each, union.surfaces)
         require(
             k not in marks, f"{file.path}: site '{each.name}' lies on a face that another one marks; keep one of them."
         )
@@ -103,7 +103,7 @@ def _united(file: PartFile) -> Solid:
     return Solid(file.path.stem, {face.name: face for face in faces}, boxes, union.centroid, union.volume)
 
 
-def _under(file: PartFile, mark: NamedSite, surfaces: tuple[UnnamedFace, ...]) -> int:
+def _find_surface_under(file: PartFile, mark: NamedSite, surfaces: tuple[UnnamedFace, ...]) -> int:
     """The index of the surface on which a site lies; an `InputError` if it lies on an edge or on no surface."""
     from shapely import Point
 

@@ -40,7 +40,7 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
         raise InputError(f"{file}, inertia_mm5: that of the pieces about their centroid is [{six}]; state that.")
 
 
-def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
+def group_touching_pieces(pieces: Sequence[Piece]) -> list[set[int]]:
     """Group the indices of pieces that are connected by touching, directly or through other pieces."""
     from scipy.cluster.hierarchy import DisjointSet
 
@@ -50,12 +50,12 @@ def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
     # Only pairs whose bounding boxes meet are tested.
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
-            if not solids.connected(i, int(k)) and _gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
+            if not solids.connected(i, int(k)) and _measure_gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
                 solids.merge(i, int(k))
     return list(solids.subsets())
 
 
-def _gap(a: Piece, b: Piece) -> float:
+def _measure_gap(a: Piece, b: Piece) -> float:
     """The largest gap between two pieces along any separating axis, [m]; negative if they overlap."""
     axes = find_separating_axes(a, np.eye(3), b, np.eye(3))
     at, reach = project_on_axes(a, np.eye(3), axes)
@@ -66,7 +66,7 @@ def _gap(a: Piece, b: Piece) -> float:
 def check_part(file: PartFile, solid: Solid) -> None:
     """Raise an `InputError` unless the stated properties of a part agree with its pieces."""
     if file.stated is not None:
-        count = len(touching_groups(solid.pieces))
+        count = len(group_touching_pieces(solid.pieces))
         require(count == 1, f"{file.path}: the pieces make {count} separate solids; a part is one rigid piece.")
         stated = file.path.with_suffix(".toml")
         check_matter(solid, str(stated), check_faces(solid, stated))

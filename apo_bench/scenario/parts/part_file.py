@@ -74,10 +74,10 @@ def read_part(path: Path) -> PartFile:
     Raises:
         InputError: The file cannot be read or is not one body of named pieces, or the TOML file is not valid.
     """
-    return _kept(path, _stamp(path), _stamp(path.with_suffix(".toml")))
+    return _read_cached(path, _get_file_stamp(path), _get_file_stamp(path.with_suffix(".toml")))
 
 
-def _stamp(path: Path) -> tuple[int, int, int] | None:
+def _get_file_stamp(path: Path) -> tuple[int, int, int] | None:
     """Modification time, size and inode of a file; None if there is none."""
     try:
         stat = path.stat()
@@ -87,7 +87,7 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
 
 
 @lru_cache(maxsize=64)
-def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
+def _read_cached(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
     """Read a part file; `stamps` are only keys of the cache."""
     from apo_bench.mjcf.part_file import read_part_model
 
@@ -95,9 +95,9 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
     require(0 < len(model.geoms) <= MOST_PIECES, f"{path}: a part has 1 to {MOST_PIECES} geoms, named pieces.")
     for name in (*(geom.name for geom in model.geoms), *(site.name for site in model.sites)):
         require(is_name(name), f"{path}: '{name[:64]}' is no name: a letter, then letters, digits and _.")
-    pieces = tuple(_piece(path, geom) for geom in model.geoms)
+    pieces = tuple(_make_piece(path, geom) for geom in model.geoms)
     if all_boxes(pieces):
-        return _of_boxes(path, model, pieces)
+        return _read_boxes(path, model, pieces)
     require(not model.sites, f"{path}: sites name faces of boxes alone; state faces in {path.stem}.toml.")
     stated = read_stated_part(path.with_suffix(".toml"))
     geoms = []
@@ -107,7 +107,7 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
     return PartFile(path, pieces, (), stated, stated.density, replace(model, geoms=tuple(geoms)))
 
 
-def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFile:
+def _read_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFile:
     """The part file of a part that consists of boxes only."""
     densities = {geom.density for geom in model.geoms}
     require(
@@ -120,7 +120,7 @@ def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFi
     return PartFile(path, tuple(pieces), marks, None, min(densities), model)
 
 
-def _piece(path: Path, geom: "PartGeom") -> Piece:
+def _make_piece(path: Path, geom: "PartGeom") -> Piece:
     """The piece of a geom; an `InputError` if its size is not allowed."""
     place = f"{path}: geom '{geom.name}'"
     if geom.kind == "mesh":

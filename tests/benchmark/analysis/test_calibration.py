@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.analysis import tabulate_calibration
-from apo_bench.benchmark.report.tables.methods import calibration_table
+from apo_bench.benchmark.report.tables.methods import make_calibration_table
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -53,6 +53,6 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert right["free_mm"] == 2.0
     assert (shifted["failed_tests"], shifted["culprits"]) == ((2, 3), (1, 2))
     assert (missed["failed_tests"], missed["culprits"]) == ((1, 1), (0, 0))
-    lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
+    lines = "\n".join(make_calibration_table((raw, right, missed, shifted)).markdown())
     assert "| uncorrected | 0 | – | – | – | – | – | – |" in lines
     assert "| face-offset:3mm | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines

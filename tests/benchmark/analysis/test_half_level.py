@@ -10,7 +10,7 @@ from scipy.special import expit
 from scipy.stats import binomtest
 
 from apo_bench.benchmark.analysis import HalfLevel, tally
-from apo_bench.benchmark.analysis.half_level import half_levels, sure
+from apo_bench.benchmark.analysis.half_level import count_sure_levels, estimate_half_levels
 from tests.benchmark.analysis.test_rates import row
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -20,7 +20,7 @@ def made(rates: tuple[float, ...], levels: tuple[float, ...] = LEVELS, seeds: in
     """Of seeds that bear more or less: a seed that fails at one level fails at all worse ones."""
     pairs = zip(levels, rates, strict=True)
     rows = [row("contact", i, i < r * seeds, noise_mm=x, noise_deg=x) for x, r in pairs for i in range(seeds)]
-    (found,) = half_levels(tally(rows))
+    (found,) = estimate_half_levels(tally(rows))
     return found
 
 
@@ -60,7 +60,7 @@ def test_it_knows_no_unit(right: list[int], factor: float) -> None:
 @settings(max_examples=40, deadline=None)
 @given(right=st.lists(st.integers(0, 30), min_size=1, max_size=6))
 def test_sure_bounds_stop_at_the_first_test_that_does_not_reject(right: list[int]) -> None:
-    over, under = map(int, sure(np.array(right), np.full(len(right), 30)))
+    over, under = map(int, count_sure_levels(np.array(right), np.full(len(right), 30)))
     greater = [binomtest(k, 30, alternative="greater").pvalue <= 0.025 for k in right]
     less = [binomtest(k, 30, alternative="less").pvalue <= 0.025 for k in right][::-1]
     assert over == (greater.index(False) if False in greater else len(greater))

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_rel
-from statsmodels.stats.contingency_tables import mcnemar as reference
+from statsmodels.stats.contingency_tables import compute_mcnemar_p_value as reference
 from statsmodels.stats.multitest import multipletests
 
 from apo_bench.benchmark.analysis import compute_tango_interval
-from apo_bench.benchmark.analysis.paired import holm, mcnemar, paired
+from apo_bench.benchmark.analysis.paired import adjust_by_holm, compare_pairs, compute_mcnemar_p_value
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -36,27 +36,29 @@ def test_tango_is_ordered_and_turns_round_with_its_methods(n: int, data: st.Data
 @settings(max_examples=50, deadline=None)
 @given(b=st.integers(0, 200), c=st.integers(0, 200))
 def test_mcnemar_is_the_two_sided_sign_test(b: int, c: int) -> None:
-    p = mcnemar(b, c)
-    assert p == mcnemar(c, b)
+    p = compute_mcnemar_p_value(b, c)
+    assert p == compute_mcnemar_p_value(c, b)
     assert p == pytest.approx(reference([[0, b], [c, 0]], exact=True).pvalue, rel=1e-9)
     if b >= c > 0:
-        assert mcnemar(b + 1, c - 1) <= p
+        assert compute_mcnemar_p_value(b + 1, c - 1) <= p
 
 
 def test_holm_worked_example() -> None:
     """By hand: 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04, which may not be below the one before; as statsmodels."""
     p = list(np.random.default_rng(1).random(20))
-    assert list(holm(dict(enumerate(p))).values()) == pytest.approx(multipletests(p, method="holm")[1])
-    found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
+    assert list(adjust_by_holm(dict(enumerate(p))).values()) == pytest.approx(multipletests(p, method="holm")[1])
+    found = adjust_by_holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
     assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
 
 
 def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
     """`none` against `paper` and `paper` against `none` are one of three comparisons, not two of four."""
-    found = {(p.condition.method, p.reference): p for p in paired(rows())}
-    assert found["uncorrected", "paper"].p == found["paper", "uncorrected"].p == mcnemar(7, 0)
+    found = {(p.condition.method, p.reference): p for p in compare_pairs(rows())}
+    assert found["uncorrected", "paper"].p == found["paper", "uncorrected"].p == compute_mcnemar_p_value(7, 0)
     assert found["uncorrected", "paper"].p_adjusted == found["paper", "uncorrected"].p_adjusted
-    raised = holm({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
+    raised = adjust_by_holm(
+        {0: compute_mcnemar_p_value(2, 1), 1: compute_mcnemar_p_value(8, 0), 2: compute_mcnemar_p_value(7, 0)}
+    )
     assert [
         found[k].p_adjusted for k in (("contact", "paper"), ("contact", "uncorrected"), ("paper", "uncorrected"))
     ] == [*raised.values()]
@@ -68,8 +70,8 @@ def test_pairs_add_up_in_any_order(results: list[tuple[bool, bool]], order: Any)
     given = [row(m, i, r[k]) for i, r in enumerate(results) for k, m in enumerate(("contact", "uncorrected"))]
     shuffled = list(given)
     order.shuffle(shuffled)
-    (pair,) = paired(given, ("uncorrected",))
-    assert (pair,) == paired(shuffled, ("uncorrected",))
+    (pair,) = compare_pairs(given, ("uncorrected",))
+    assert (pair,) == compare_pairs(shuffled, ("uncorrected",))
     assert pair.recovered.trials + pair.harmed.trials == pair.pairs == len(results)
     assert pair.both + pair.neither + pair.only_method + pair.only_reference == pair.pairs
 
@@ -87,7 +89,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def test_discordant_pairs_are_counted_both_ways() -> None:
-    found = {(p.condition.method, p.reference): p for p in paired([*rows(), row("oracle")])}
+    found = {(p.condition.method, p.reference): p for p in compare_pairs([*rows(), row("oracle")])}
     assert set(found) == {
         ("contact", "paper"),
         ("contact", "uncorrected"),
@@ -102,9 +104,9 @@ def test_discordant_pairs_are_counted_both_ways() -> None:
 
 
 def test_free_errors_are_compared_pair_by_pair() -> None:
-    pair = paired(rows())[0]
+    pair = compare_pairs(rows())[0]
     errors = {m: [r["planned_error_free_mm"] for r in rows() if r["method"] == m] for m in ("contact", "uncorrected")}
-    (pair,) = [p for p in paired(rows()) if (p.condition.method, p.reference) == ("contact", "uncorrected")]
+    (pair,) = [p for p in compare_pairs(rows()) if (p.condition.method, p.reference) == ("contact", "uncorrected")]
     expected = ttest_rel(errors["contact"], errors["uncorrected"]).confidence_interval(0.95)
     assert pair.free_mm == pytest.approx(np.mean(errors["contact"]) - np.mean(errors["uncorrected"]))
     assert pair.free_interval == pytest.approx((expected.low, expected.high))
@@ -112,6 +114,6 @@ def test_free_errors_are_compared_pair_by_pair() -> None:
 
 def test_only_seeds_that_both_have_are_pairs() -> None:
     given = [row("contact", 0), row("contact", 1, None), row("contact", 2), row("paper", 1), row("paper", 2, False)]
-    (pair,) = paired(given)
+    (pair,) = compare_pairs(given)
     assert (pair.pairs, pair.only_method, pair.only_reference, pair.planned) == (1, 1, 0, 0)
     assert (pair.free_mm, pair.free_interval) == (None, None)

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.analysis import group_by_setting, list_settings, tabulate_probing, tally
-from apo_bench.benchmark.analysis.paired import reference_condition
-from apo_bench.benchmark.report.tables.conditions import condition_table
+from apo_bench.benchmark.analysis.paired import get_reference_condition
+from apo_bench.benchmark.report.tables.conditions import make_condition_table
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -48,8 +48,8 @@ def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None
         ("wrist", ("contact", "contact+probe")),
     ]
     assert ["sensor joint-torque" in s.title for s in groups] == [s.ft_sensor == "joint-torque" for s in groups]
-    assert reference_condition(cells[2], "uncorrected").ft_sensor == "wrist"
-    table = condition_table(cells)
+    assert get_reference_condition(cells[2], "uncorrected").ft_sensor == "wrist"
+    table = make_condition_table(cells)
     shown = [column.head for column in table.shown].index("ft_sensor")
     assert [line[shown] for line in table.lines] == ["any", "wrist", "joint-torque"]
     assert "assumed_robot_error" not in [column.head for column in table.shown]

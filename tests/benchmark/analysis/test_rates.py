@@ -15,8 +15,8 @@ from statsmodels.stats.proportion import proportion_confint
 
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import Rate, compute_wilson_interval, tabulate_confusion, tabulate_effort, tally
-from apo_bench.benchmark.report.report import report
-from apo_bench.benchmark.report.tables.methods import prediction_summary
+from apo_bench.benchmark.report.report import write_report
+from apo_bench.benchmark.report.tables.methods import summarise_predictions
 from apo_bench.records import RECORD_SCHEMA
 from tests import pages
 
@@ -149,7 +149,7 @@ def test_predictions_are_counted_against_physics() -> None:
     assert (ceiling["method"], ceiling["agreement"], measured["scenario"]) == ("oracle", 1.0, "stick_on_castles")
     assert (everything["scenario"], everything["method"], everything["executed"]) == ("all", "all", 8)
     assert everything["agreement"] == 6 / 8
-    assert prediction_summary(everything) == (
+    assert summarise_predictions(everything) == (
         "Predicted: 6 of 8 executed trials ended as predicted (75.0 %, counted by as_demonstrated); failures that were "
         "not predicted: 1, warnings that were wrong: 1."
     )
@@ -175,7 +175,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
         rows += [
             row("paper", seed=i, success=None if i == 3 else True, noise_mm=level, noise_deg=level) for i in range(4)
         ]
-    made = report(write(tmp_path / "run", rows))
+    made = write_report(write(tmp_path / "run", rows))
     table = list(csv.DictReader(made.tables["conditions"].open()))
     assert [(line["method"], line["noise_mm"], line["trials"], line["successes"]) for line in table] == [
         ("oracle", "0.0", "4", "4"),
@@ -198,13 +198,13 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
 
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no sweep"):
-        report(tmp_path / "nowhere")
+        write_report(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no finished trial"):
-        report(write(tmp_path / "empty", []))
+        write_report(write(tmp_path / "empty", []))
     with pytest.raises(InputError, match=r"line 2: Object missing required field `schema`"):
-        report(write(tmp_path / "bad", [row(), {"seed": 1}]))
+        write_report(write(tmp_path / "bad", [row(), {"seed": 1}]))
     with pytest.raises(InputError, match="record of schema 'apo-bench/row/1'"):
-        report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
+        write_report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
 
 
 def test_effort_counts_what_was_right() -> None:

@@ -14,7 +14,7 @@ from pyarrow import parquet
 
 from apo_bench import TrialConfig, load_scenario, run_trial
 from apo_bench.benchmark.datasets import trial_dataset
-from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, replays
+from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, record_replays
 from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
@@ -128,7 +128,7 @@ def test_what_is_wrong_is_said(
 def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def signalled(trials: Any, scenes: Any) -> Any:
         assert [each.name for each in (tmp_path / "out").iterdir() if each.name == "UNFINISHED"]
-        for each in replays(trials, scenes):
+        for each in record_replays(trials, scenes):
             os.kill(os.getpid(), signal.SIGTERM)
             yield each
 

@@ -8,7 +8,7 @@ import pytest
 from apo_bench import InputError, load_scenario
 from apo_bench.assembly import Demonstration, build_contact_equations
 from apo_bench.benchmark.datasets import draw_endless_pairs, draw_pairs, training_pairs
-from apo_bench.benchmark.datasets.training_pairs import by_part, observe_many
+from apo_bench.benchmark.datasets.training_pairs import observe_many, observes_by_part
 from apo_bench.benchmark.scoring.track import read_tracks
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.symmetric_parts import AnyTurnNoise
@@ -26,7 +26,7 @@ KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurnNoise]
 
 def test_models_whose_parts_are_independent_are_drawn_together() -> None:
     assert {
-        name for name in (*NOISES, *list_presets()) if not by_part(make_noise(name, NoiseLevel(1.0, 1.0)))
+        name for name in (*NOISES, *list_presets()) if not observes_by_part(make_noise(name, NoiseLevel(1.0, 1.0)))
     } == SHARED
     assert not draw_pairs("stick_in_tower", "swaps", 3).together
     assert draw_pairs("stick_in_tower", "bias", 3).together
@@ -74,7 +74,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
 @pytest.mark.parametrize("name", ["pocket_table", "gearbox", "dovetail"])
 def test_every_contact_of_the_truth_holds(name: str) -> None:
     scenario = load_scenario(name)
-    layouts = draw_layouts(scenario, training_pairs.seed_block(0, name, 0), 2)
+    layouts = draw_layouts(scenario, training_pairs.make_block_generator(0, name, 0), 2)
     many = draw_pairs(name, n=2)
     np.testing.assert_array_equal(many.truth, layouts.poses)
     for i, goals in enumerate(many.truth):
@@ -101,7 +101,7 @@ def test_no_stream_of_chance_is_one_of_a_trial() -> None:
     most = max(grid.trials for track in read_tracks(()) for grid in track.grids)
     drawn = [stream(seed, which).random() for seed in range(max(most, 100)) for which in range(12)]
     ours = [
-        training_pairs.seed_block(seed, name, block).random()
+        training_pairs.make_block_generator(seed, name, block).random()
         for seed in range(20)
         for name in list_scenario_names()
         for block in range(3)

@@ -17,7 +17,7 @@ from apo_bench.benchmark.analysis import (
     contrast,
     summarise,
 )
-from apo_bench.benchmark.report.conclusions import ALIKE_WITHIN, answer
+from apo_bench.benchmark.report.conclusions import ALIKE_WITHIN, write_answer
 from tests.benchmark.analysis.test_rates import row
 
 METHODS = ("contact", "uncorrected", "paper", "snap")
@@ -25,7 +25,7 @@ COUNT = re.compile(r"`([^`]+)`(?: with \d reobservations)? (?:succeeds )?in ([\d
 
 
 def said(rows: list[dict[str, Any]]) -> str:
-    return answer(rows, summarise(rows).half_levels)
+    return write_answer(rows, summarise(rows).half_levels)
 
 
 def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[str, Any]]:
@@ -101,7 +101,7 @@ def test_no_sentence_contradicts_the_counts(rows: list[dict[str, Any]]) -> None:
     for r in rows:
         if r["success"] is not None:
             results.setdefault(r["method"], {})[r["noise_mm"], r["seed"]] = r["success"]
-    words = answer(rows, ())
+    words = write_answer(rows, ())
     if not any(any(own.values()) for own in results.values()):
         assert words.startswith("No method succeeds in any trial" if results else "No trial counts")
         return

@@ -12,13 +12,13 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import tally
-from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.report.report import write_report
 from apo_bench.cli import app as cli
 from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
-from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.replay_command import format_replay_command
 from apo_bench.records.run.run_folder import read_records
-from apo_bench.records.user_code import own_code
+from apo_bench.records.user_code import list_user_code
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -73,7 +73,7 @@ def test_nothing_that_rows_name_is_imported(hostile: Path) -> None:
     ],
 )
 def test_what_is_code_of_ones_own(names: dict[str, str], own: tuple[str, ...]) -> None:
-    assert own_code(row() | names) == own
+    assert list_user_code(row() | names) == own
 
 
 def dangerous(seed: int, evil: str) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def dangerous(seed: int, evil: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("evil", DANGEROUS)
 def test_commands_are_quoted(evil: str) -> None:
-    said = shlex.split(replay_command(dangerous(3, evil)))
+    said = shlex.split(format_replay_command(dangerous(3, evil)))
     assert said[:2] == ["apo-bench", "run"]
     assert said[2] == (f"./{evil}" if evil.startswith("-") else evil)
     for option, value in (("--noise", evil), ("--arm", evil), ("--contact-source", f"x:{evil}"), ("--method", evil)):
@@ -100,7 +100,7 @@ def test_commands_are_quoted(evil: str) -> None:
 def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [dangerous(seed, evil) for seed, evil in enumerate(DANGEROUS)]
     folder = write(tmp_path / "run", rows)
-    page = report(folder).page
+    page = write_report(folder).page
     assert "<script>alert" not in page.read_text(encoding="utf-8")
     assert all(evil in pages.lines(page) for evil in DANGEROUS)
     assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 0
@@ -113,7 +113,7 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize("evil", ["two\nlines", "\u202etxt"])
 def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"line 1, field {name}: control characters are not allowed"):
-        report(write(tmp_path / "run", [row("contact") | {name: evil}]))
+        write_report(write(tmp_path / "run", [row("contact") | {name: evil}]))
 
 
 def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -130,10 +130,10 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
     from apo_bench.assembly import Outcome
     from apo_bench.cli.shared import print_columns
     from apo_bench.trial.record_start_and_end import end_record
-    from apo_bench.viz.trial_text import summary_lines
+    from apo_bench.viz.trial_text import format_summary
 
     end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
-    print_columns(summary_lines(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
+    print_columns(format_summary(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
@@ -148,7 +148,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
     target.mkdir() if name in ("tables", "figures") else target.write_text("mine", encoding="utf-8")
     (folder / name).symlink_to(target)
     with pytest.raises(InputError, match=f"{name} is a symbolic link"):
-        report(folder)
+        write_report(folder)
     assert list(target.iterdir()) == [] if target.is_dir() else target.read_text(encoding="utf-8") == "mine"
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench.benchmark.report.report import Report, report
+from apo_bench.benchmark.report.report import Report, write_report
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 from tests.browser import browser, opened
@@ -47,7 +47,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
     (folder / "timing.jsonl").write_text(text, encoding="utf-8")
     run = {"schema": "apo-bench/run/4", "command": "apo-bench sweep x", "versions": {"mujoco": "3.17.0"}, "grids": [{}]}
     (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
-    return report(folder)
+    return write_report(folder)
 
 
 @pytest.fixture(scope="module")
@@ -160,5 +160,5 @@ def test_tables_are_the_same_as_parquet(made: Report) -> None:
     ids=["excluded", "oracle", "conditions"],
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
-    made = report(write(tmp_path / "run", trials))
+    made = write_report(write(tmp_path / "run", trials))
     assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_mm"] is not None for r in trials)

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.report.failure_choice import sample
-from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.report.failure_choice import choose_failures
+from apo_bench.benchmark.report.report import write_report
 from apo_bench.cli import app as cli
-from apo_bench.records.run.replay_command import milli, number, replay_command
-from apo_bench.viz.failure_pictures import failure_pictures
+from apo_bench.records.run.replay_command import format_number, format_replay_command, round_up_to_ms
+from apo_bench.viz.failure_pictures import draw_failures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -32,7 +32,7 @@ def trials() -> list[dict[str, Any]]:
 def test_commands_of_a_page_give_identical_rows(
     trials: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = report(write(tmp_path / "run", trials))
+    made = write_report(write(tmp_path / "run", trials))
     kept = pages.trials(made.page)
     words = kept["words"]
     columns = kept["columns"]
@@ -49,39 +49,39 @@ def test_commands_of_a_page_give_identical_rows(
 def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     """From its record, and in the page, linked from its cell."""
     folder = write(tmp_path / "run", trials)
-    made, missed = failure_pictures(sample(trials, 1), folder, {})
+    made, missed = draw_failures(choose_failures(trials, 1), folder, {})
     if missed and "no picture can be drawn here" in missed[0]:
         pytest.skip(missed[0])
     assert made[0].jpeg.startswith(b"\xff\xd8")
     moved = [{**r, "reached": {part: [x + 30.0, *rest] for part, (x, *rest) in r["reached"].items()}} for r in trials]
-    elsewhere, _ = failure_pictures(sample(moved, 1), write(tmp_path / "moved", moved), {})
+    elsewhere, _ = draw_failures(choose_failures(moved, 1), write(tmp_path / "moved", moved), {})
     assert elsewhere[0].jpeg != made[0].jpeg
-    page = report(folder, 1, failure_pictures)
+    page = write_report(folder, 1, draw_failures)
     assert page.pictures == 1
-    assert 'src="data:image/jpeg;base64,' in page.page.read_text(encoding="utf-8")
-    assert list(pages.trials(page.page)["pictures"].values()) == [0]
+    assert 'src="data:image/jpeg;base64,' in page.render_page.read_text(encoding="utf-8")
+    assert list(pages.trials(page.render_page)["pictures"].values()) == [0]
 
 
 def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     usual = {"pose_source": "noise-model", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
     said = "apo-bench run stick_in_tower --clearance-mm 0.25 --method uncorrected --seed 3"
-    assert replay_command(row("uncorrected", 3, **usual)) == replay_command(row("uncorrected", 3)) == said
+    assert format_replay_command(row("uncorrected", 3, **usual)) == format_replay_command(row("uncorrected", 3)) == said
     other = row(
         "my mod:it's", 9, noise_mm=0.1, noise_deg=0.3, human_error_scale=0.5, noise="a b.toml",
         contact_source="face-offset:3mm", grasp="weld",
         clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "near-contact", "arm": "mine:arm"}),
     )  # fmt: skip
-    assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == shlex.split(
+    assert shlex.split(format_replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == shlex.split(
         "apo-bench run 'my dir/tower.toml' --noise-mm 0.1 --noise-deg 0.3 --human-error-scale 0.5 --clearance-mm 0.3 "
         "--noise 'a b.toml' --grasp weld --arm mine:arm --contact-source face-offset:3mm --method \"my mod:it's\" "
         "--timestep-ms 0.5 --fidelity near-contact --seed 9"
     )
     seen = row("contact", 1, noise_mm=0.5, noise_deg=0.0, noise="depth-camera", pose_source="depth-camera")
     given = "--noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
-    assert replay_command(seen) == f"apo-bench run stick_in_tower {given}"
+    assert format_replay_command(seen) == f"apo-bench run stick_in_tower {given}"
 
 
 @pytest.mark.parametrize("x", [0.1, 0.25, 1.0, 3.0, 1e-7, 0.30000000000000004, 12345.678])
 def test_numbers_are_read_as_they_were(x: float) -> None:
-    assert float(number(x)) == x
-    assert milli(x * 1e-3) * 1e-3 == x * 1e-3
+    assert float(format_number(x)) == x
+    assert round_up_to_ms(x * 1e-3) * 1e-3 == x * 1e-3

@@ -21,7 +21,7 @@ import pytest
 from apo_bench import SweepConfig, run_sweep
 from apo_bench.benchmark.sweeps import cluster as on_ray
 from apo_bench.benchmark.sweeps.grid import load_all
-from apo_bench.benchmark.sweeps.user_files import travelling_files
+from apo_bench.benchmark.sweeps.user_files import list_user_files_for_nodes
 from apo_bench.cli.app import main
 from apo_bench.resources import folder
 
@@ -186,7 +186,9 @@ def test_files_below_the_current_folder_travel_and_no_others(
     shutil.copy(folder("assets") / "parts" / "block.xml", own / "part.xml")
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     loaded = load_all([replace(SPEC, scenario=("deep/mine.toml", str(far), "stick_in_tower"))])
-    travel = travelling_files(loaded, (), ("code_of_mine:raises+probe", "noise.toml", "camera", "given", "six_axis"))
+    travel = list_user_files_for_nodes(
+        loaded, (), ("code_of_mine:raises+probe", "noise.toml", "camera", "given", "six_axis")
+    )
     code = {"code_of_mine.py", "helper_of_mine.py"}
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml"} | code
     assert all((own / name).samefile(path) for name, path in travel.items())

@@ -17,13 +17,13 @@ import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.sweeps import pool
-from apo_bench.benchmark.sweeps.stop_signals import Stopped, stop_at_signals
+from apo_bench.benchmark.sweeps.stop_signals import StoppedBySignal, stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Worker
 from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
-from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import limits_of, read_run
-from apo_bench.trial.fingerprint import versions
+from apo_bench.records.run.replay_command import format_replay_command
+from apo_bench.records.run.run_file import read_limits, read_run
+from apo_bench.trial.fingerprint import list_versions
 
 CODE = """
 import ctypes, os, sys, time
@@ -107,7 +107,7 @@ def test_rows_are_the_same_bytes_whoever_makes_them_and_a_death_costs_one_trial(
 
 def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Limits = USUAL_LIMITS) -> dict[str, Any]:
     """The row that the command of a row prints."""
-    assert main([*shlex.split(replay_command(row, None, limits))[1:], "--json"]) == 0
+    assert main([*shlex.split(format_replay_command(row, None, limits))[1:], "--json"]) == 0
     return dict(json.loads(capsys.readouterr().out))
 
 
@@ -116,7 +116,7 @@ def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
     method: str, two: list[Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     row = next(row for row in two if row["method"] == f"unruly:{method}")
-    assert ("--trial-limit 600" in replay_command(row)) is (method == "dies")
+    assert ("--trial-limit 600" in format_replay_command(row)) is (method == "dies")
     assert replayed(row, capsys) == json.loads(json.dumps(row))
 
 
@@ -125,11 +125,11 @@ def test_a_trial_that_hangs_is_ended_at_its_limit_and_the_others_go_on(
 ) -> None:
     rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=4.0)
     assert endings(rows) == {method: ENDS[method] for method in ("unruly:hangs", "unruly:raises")}
-    limits = limits_of(read_run(tmp_path / "run"))
+    limits = read_limits(read_run(tmp_path / "run"))
     assert limits == Limits(4.0)
     late = next(row for row in rows if row["method"] == "unruly:hangs")
     assert "4" not in late["sentence"]
-    assert "--trial-limit 4 " in replay_command(late, None, limits)
+    assert "--trial-limit 4 " in format_replay_command(late, None, limits)
     assert replayed(late, capsys, limits) == json.loads(json.dumps(late))
 
 
@@ -151,11 +151,11 @@ def test_a_row_on_standard_output_stands_there_alone(
 
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
     batch = (TrialConfig("block_on_block", method="uncorrected"),)
-    other = SweepInputs({"block_on_block": "0123456789abcdef"}, versions())
+    other = SweepInputs({"block_on_block": "0123456789abcdef"}, list_versions())
     with pytest.raises(InputError, match="has other files for 'block_on_block'"):
         list(Worker(other, {}).run(batch))
     with pytest.raises(InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install"):
-        Worker(SweepInputs({}, versions() | {"mujoco": "1.2.3"}), {})
+        Worker(SweepInputs({}, list_versions() | {"mujoco": "1.2.3"}), {})
     with pytest.raises(InputError, match="has other files"):
         pool.run_locally([batch], other, 1, 60.0, lambda row, timing: None)
 
@@ -222,7 +222,7 @@ def test_signals_raise_and_handlers_of_the_callers_own_stay() -> None:
 
     before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
-        with stop_at_signals(), pytest.raises(Stopped) as stopped:
+        with stop_at_signals(), pytest.raises(StoppedBySignal) as stopped:
             signal.raise_signal(signal.SIGTERM)
         assert stopped.value.number == signal.SIGTERM
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

@@ -19,12 +19,12 @@ from apo_bench import InputError, SweepConfig, load_scenario
 from apo_bench.assembly import Outcome
 from apo_bench.benchmark.sweeps import sweep as runner
 from apo_bench.benchmark.sweeps import worker
-from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.grid import list_work_units, load_all
 from apo_bench.records import ENV_ID, RECORD_SCHEMA, get_record_key, list_setting_columns, make_trial_key
 from apo_bench.records.run.run_folder import read_records
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import record_start_and_end, run
-from apo_bench.trial.fingerprint import config_hash
+from apo_bench.trial.fingerprint import compute_config_hash
 from apo_bench.trial.record_start_and_end import end_record
 
 METHODS = ("oracle", "uncorrected", "paper")
@@ -51,7 +51,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     def run_trial(spec: Any, scene: Any, *, simulated: str, content: str, cache: Any) -> dict[str, Any]:
         did["trial"] += 1
         assert simulated == f"{scene.scenario.name} {spec.human_error_scale} {spec.seed} {spec.pose_source}"
-        hashed = config_hash(spec, content)
+        hashed = compute_config_hash(spec, content)
         success = spec.seed % 2 == 0
         ended = end_record(
             Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
@@ -77,7 +77,7 @@ def test_the_grid_is_every_combination_once() -> None:
     two = ("stick_in_tower", "stick_on_castles")
     spec = SweepConfig(two, (0, 1, 1), (0, 1), METHODS, clearance_mm=(0.25, 0.5), trials=2)
     loaded = load_all([spec])
-    keys = [make_trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit]
+    keys = [make_trial_key(t, loaded[t.scenario].name) for unit in list_work_units([spec], loaded) for t in unit]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
     assert {key[2] for key in keys} == {0, 1}
 
@@ -90,7 +90,7 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
     )
     assert spec.contact_source == ("given", "false-negative", "face-offset:3mm")
     loaded = load_all([spec])
-    trials = [t for unit in units([spec], loaded) for t in unit]
+    trials = [t for unit in list_work_units([spec], loaded) for t in unit]
     keys = {make_trial_key(t, "stick_in_tower") for t in trials}
     assert len(keys) == len(trials) == 3 * (1 + 2 * 2 * (1 + 3))
     met = {m: {(t.noise, t.contact_source) for t in trials if t.method == m} for m in spec.method}

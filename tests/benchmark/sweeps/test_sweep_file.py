@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError, SweepConfig, run_sweep
-from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.grid import list_work_units, load_all
 from apo_bench.benchmark.sweeps.sweep_file import is_sweep_file, read_sweep
 from apo_bench.cli.app import main
 from apo_bench.records import make_trial_key
@@ -73,11 +73,11 @@ def test_trials_of_all_grids_are_united_each_once() -> None:
     again = SweepConfig(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
     other = SweepConfig(("block_on_block",), ((2, 1),), (1,), ("uncorrected",), trials=1, seed=6)
     loaded = load_all([first, again, other])
-    trials = [t for unit in units([first, again, other], loaded) for t in unit]
+    trials = [t for unit in list_work_units([first, again, other], loaded) for t in unit]
     keys = [make_trial_key(t, loaded[t.scenario].name) for t in trials]
     assert len(set(keys)) == len(keys) == 2 * (1 + 2 * 2 * 2) + 1 * (1 + 2) + 1
     assert [(t.seed, t.noise_mm, t.noise_deg) for t in trials if t.scenario == "block_on_block"] == [(6, 2.0, 1.0)]
-    for unit in units([first, again, other], loaded):
+    for unit in list_work_units([first, again, other], loaded):
         assert len({(t.scenario, t.clearance_mm, t.seed, t.human_error_scale, t.pose_source) for t in unit}) == 1
 
 

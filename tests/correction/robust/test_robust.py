@@ -13,7 +13,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.wrong_contacts import find_wrong_relation, make_contacts, replace_contacts
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.pose_error import measure_goal_errors
 from tests.shipped import BOXES
 
 
@@ -43,7 +43,7 @@ def astray(observation, k, seed=0):
 
 def fixed_error_mm(name, seed, correction):
     scenario, layout, _ = shown(name, seed)
-    return goal_errors(scenario.assembly, layout.start, layout.poses, correction.poses)[0]
+    return measure_goal_errors(scenario.assembly, layout.start, layout.poses, correction.poses)[0]
 
 
 @pytest.mark.parametrize("name", BOXES)
@@ -131,7 +131,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     assert found.left_out == ()
     (dropped,) = found.dropped
     assert dropped.startswith(f"{find_wrong_relation(observation.assembly, wrong.assembly)}: ")
-    assert goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
+    assert measure_goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
 
 
 @pytest.mark.parametrize("seed", range(5, 9))
@@ -145,4 +145,4 @@ def test_a_pose_that_is_flipped_is_turned_back_and_no_relation_is_blamed(seed):
     assert found.dropped == ()
     assert found.left_out == ()
     assert "seen turned: operation 2" in found.sentence
-    assert goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
+    assert measure_goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1

@@ -10,7 +10,7 @@ import pytest
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.new_scenario import NoAssemblyOrder
 from apo_bench.importers.assembly.posed_parts import PosedPart
-from apo_bench.importers.assembly.scenario_writer import scenario_text
+from apo_bench.importers.assembly.scenario_writer import format_scenario
 from apo_bench.importers.assembly.up_axis import new_upright_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import Body, extrude, join, make_rectangle, write_part
@@ -59,7 +59,7 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     found = new_upright_scenario(over, fixed=("cup",))
     assert found.up.startswith("-z, as with z up there is no order")
     assert new_upright_scenario(over, "-z", ("cup",)).up == "-z, as asked"
-    assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path / "own.toml")
+    assert "# Up: -z, as with z up" in format_scenario(found, "own", "a test", tmp_path / "own.toml")
     assert [placing.moves for placing in found.order] == [("core",)]
 
 

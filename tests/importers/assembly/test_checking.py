@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench.importers.assembly.contact_search import find_clashes
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed_parts import on_the_table
+from apo_bench.importers.assembly.posed_parts import place_on_table
 from apo_bench.importers.assembly.scenario_check import check_file
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts import load_part
@@ -25,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plate = extrude(make_rectangle(80, 60), 0, 15, bottom="bottom", top="top")
     cube = extrude(make_rectangle(30, 30), 0, 30, bottom="bottom", top="top")
     places = {"plate": ("plate", at(0, 0, 0)), "cube": ("cube", at(0, 0, 15))}
-    pile = new_scenario(on_the_table(made(folder, {"plate": plate, "cube": cube}, places)))
+    pile = new_scenario(place_on_table(made(folder, {"plate": plate, "cube": cube}, places)))
     write_scenario(pile, folder / "own.toml", "own", "a test")
     return folder
 
@@ -54,7 +54,7 @@ def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path
     thin = make_shaft(1.5, 0, 90, "side", bottom="tip", top="head")
     places = {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     path = tmp_path / "own.toml"
-    tall = new_scenario(on_the_table(made(tmp_path, {"plate": hole, "thin": thin}, places)))
+    tall = new_scenario(place_on_table(made(tmp_path, {"plate": hole, "thin": thin}, places)))
     start = np.array(tall.starts["thin"])
     start[2, 3] = 0.0  # beside its fixture
     write_scenario(replace(tall, fixtures={}, starts={**tall.starts, "thin": start}), path, "own", "a test")

@@ -10,7 +10,7 @@ import pytest
 from apo_bench import InputError, Scenario, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed_parts import PosedPart, on_the_table
+from apo_bench.importers.assembly.posed_parts import PosedPart, place_on_table
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
@@ -59,7 +59,7 @@ def covered(folder: Path, off_mm: float) -> tuple[PosedPart, ...]:
 
 def loaded(parts: tuple[PosedPart, ...], folder: Path, *fixed: str) -> Scenario:
     path = folder / "own.toml"
-    write_scenario(new_scenario(on_the_table(parts), fixed), path, "own", "a test")
+    write_scenario(new_scenario(place_on_table(parts), fixed), path, "own", "a test")
     return load_scenario(path)
 
 
@@ -78,7 +78,7 @@ def test_contacts_order_and_starts_are_found_and_poses_closed(tmp_path: Path) ->
 
 
 def test_the_order_is_as_asked_where_that_can_be(tmp_path: Path) -> None:
-    parts = on_the_table(covered(tmp_path, off_mm=0.0))
+    parts = place_on_table(covered(tmp_path, off_mm=0.0))
     for asked in (("pin_1", "pin_2", "cover"), ("pin_2", "pin_1", "cover")):
         assert tuple(placing.moves[0] for placing in new_scenario(parts, wanted_order=asked).order) == asked
     for wrong in (("pin_1", "cover"), ("pin_1", "pin_2", "lid")):
@@ -116,13 +116,13 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
         tmp_path, {"plate": plate(15, 4.0), "pin": PIN}, {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 0))}
     )
     with pytest.raises(RuntimeError, match="a press fit or a thread"):
-        new_scenario(on_the_table(tight))
+        new_scenario(place_on_table(tight))
     thin = make_shaft(1.5, 0, 90, "side", bottom="tip", top="head")
     hole = extrude(make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
     tall = made(
         tmp_path, {"plate": hole, "thin": thin}, {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     )
-    notes = new_scenario(on_the_table(tall)).notes
+    notes = new_scenario(place_on_table(tall)).notes
     assert any("'thin' starts in a fixture" in note for note in notes)
 
 
@@ -130,7 +130,7 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     floor = extrude(make_rectangle(90, 60), 0, 10, bottom="bottom", top="top")
     cube = extrude(make_rectangle(20, 20), 0, 30, bottom="bottom", top="top")
     places = {"floor": ("floor", at(0, 0, 0)), "left": ("cube", at(-15, 0, 10)), "right": ("cube", at(15, 0, 10))}
-    found = new_scenario(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
+    found = new_scenario(place_on_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
     last = found.grasps[found.order[-1].moves[0]]
     assert last is not None
     assert abs(last.across[1]) == pytest.approx(1.0)
@@ -147,7 +147,7 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
     assert any(
         "stand out higher" in note
-        for note in new_scenario(on_the_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
+        for note in new_scenario(place_on_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
     )
 
 
@@ -156,4 +156,4 @@ def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     bar = extrude(make_rectangle(100, 20), 0, 10, bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on base"):
-        new_scenario(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
+        new_scenario(place_on_table(made(tmp_path, {"base": base, "bar": bar}, places)))

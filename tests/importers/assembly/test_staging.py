@@ -11,8 +11,8 @@ import pytest
 from apo_bench import InputError
 from apo_bench.geometry import Box, Solid, pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
-from apo_bench.importers.assembly.posed_parts import on_the_table, read_posed
-from apo_bench.importers.assembly.scenario_writer import scenario_text
+from apo_bench.importers.assembly.posed_parts import place_on_table, read_posed
+from apo_bench.importers.assembly.scenario_writer import format_scenario
 from apo_bench.importers.assembly.staging import find_stance, stage_parts
 from apo_bench.scenario.parts.making import extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made
@@ -47,12 +47,12 @@ def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) ->
     lid = extrude(make_rectangle(110, 110), 0, 30, bottom="bottom", top="top")
     rod = make_shaft(6, 0, 50, "side", bottom="tip", top="head")
     places = {"slab": ("slab", at(0, 0, 0)), "lid": ("lid", at(0, 0, 30)), "rod": ("rod", at(0, 25, 66, 90, 0, 0))}
-    result = new_scenario(on_the_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
+    result = new_scenario(place_on_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
     assert "'rod' lies on a round wall at its start and may roll" in result.notes
     assert any(
         note.startswith("'lid', 110 x 110 x 30 mm as it stands, offers no place to a gripper") for note in result.notes
     )
-    text = scenario_text(result, 'a "title"', "a test", tmp_path / "own.toml")
+    text = format_scenario(result, 'a "title"', "a test", tmp_path / "own.toml")
     assert 'title = "a \\"title\\""' in text
     assert "# NOTE: 'rod' lies on a round wall at its start and may roll." in text
     assert "# NO PLACE for the gripper" in text
@@ -63,7 +63,7 @@ def test_the_assembly_stands_on_the_table_whichever_axis_looks_up(tmp_path: Path
     parts = made(tmp_path, {"block": block}, {"one": ("block", at(5, 6, 7)), "other": ("block", at(5, 6, 47))})
     for up, axis in {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}.items():
         for sign in (1.0, -1.0):
-            upright = on_the_table(parts, up if sign > 0 else f"-{up}")
+            upright = place_on_table(parts, up if sign > 0 else f"-{up}")
             np.testing.assert_allclose(upright[0].T[:3, :3] @ np.array(axis) * sign, (0, 0, 1), atol=1e-12)
             corners = np.concatenate([pose.apply(each.T, each.solid.bounds) for each in upright])
             assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-9)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.importers.cad.faces.surface_fitting import Round
-from apo_bench.importers.cad.part_import import raw_solids
+from apo_bench.importers.cad.faces.surface_fitting import RoundSurface
+from apo_bench.importers.cad.part_import import read_raw_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from tests.importers.cad.made import block, rod, write_triangles
@@ -23,7 +23,7 @@ def triangles(mesh: Any) -> Any:
 def test_corners_that_nearly_meet_are_joined(tmp_path: Path) -> None:
     near = triangles(block(20, 20, 20)).astype(np.float32)
     near[0, 0, 0] = np.nextafter(near[0, 0, 0], np.float32(100.0))
-    _, (raw,) = raw_solids(write_triangles(near, tmp_path / "a.stl"), None)
+    _, (raw,) = read_raw_solids(write_triangles(near, tmp_path / "a.stl"), None)
     assert raw.mesh.volume == pytest.approx(8000.0)
 
 
@@ -39,7 +39,9 @@ def as_brep(body: Any) -> BrepSolid:
     wall = (np.abs(reach - 5.0) < 0.01) & (np.abs(normals[:, 2]) < 0.1)
     index = np.arange(3 * len(corners)).reshape(-1, 3)
     z = np.array([0.0, 0.0, 1.0])
-    round_face = BrepFace(Round(np.zeros(3), z, 5.0, 0.0), 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()])
+    round_face = BrepFace(
+        RoundSurface(np.zeros(3), z, 5.0, 0.0), 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()]
+    )
     flat = [BrepFace(Plane(p[0], -n), 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
     return BrepSolid("a", (round_face, *flat), ())
 

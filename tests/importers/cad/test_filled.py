@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from apo_bench.importers.cad.part_import import import_solid, raw_solids
+from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
 from apo_bench.importers.cad.pieces import convex_cutting
 from tests.importers.cad.made import block, rod, write_stl
 
@@ -23,7 +23,7 @@ def plate() -> Manifold:
 def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
+    _, (raw,) = read_raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
     whole = import_solid(raw, "whole", tmp_path, "a.stl")
     assert len(whole.solid.rounds) == 6
     assert not whole.cut.filled

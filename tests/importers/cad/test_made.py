@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.importers.cad.part_import import ImportedPart, import_solid, raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, read_raw_solids
 from apo_bench.scenario.parts import load_part
 from tests.importers.cad.held import hold
 from tests.importers.cad.made import MADE, write_stl
@@ -15,7 +15,7 @@ PARAMETER_MM = 0.02
 
 
 def imported(name: str, folder: Path) -> ImportedPart:
-    _, (raw,) = raw_solids(write_stl(MADE[name]().mesh, folder / f"{name}.stl"), None)
+    _, (raw,) = read_raw_solids(write_stl(MADE[name]().mesh, folder / f"{name}.stl"), None)
     return import_solid(raw, name, folder, f"{name}.stl", density=8000.0)
 
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from apo_bench import InputError
 from apo_bench.importers.cad.meshes.obj import read_obj
-from apo_bench.importers.cad.meshes.shells import closed_solids
-from apo_bench.importers.cad.part_import import raw_solids
+from apo_bench.importers.cad.meshes.shells import split_into_solids
+from apo_bench.importers.cad.part_import import read_raw_solids
 from tests.importers.cad.made import U_SHAPE, area, prism, write_stl, write_triangles
 
 Ring = Sequence[tuple[float, float]]
@@ -47,7 +47,7 @@ def test_any_extruded_polygon_comes_back_with_its_volume(ring: list[tuple[float,
     path = Path("a.obj")
     mesh = read_obj(path, prism_obj(ring, high, at % len(ring)).encode())
     assert len(mesh.triangles) == 4 * len(ring) - 4
-    (solid,) = closed_solids(path, "a", mesh)
+    (solid,) = split_into_solids(path, "a", mesh)
     assert solid.mesh.volume == pytest.approx(area(ring) * high, rel=1e-9)
     caps = np.abs(mesh.across[:, 2]).sum() / 2.0
     assert caps == pytest.approx(2.0 * area(ring), rel=1e-9), "triangles of a cap lie side by side"
@@ -65,5 +65,5 @@ def test_a_concave_face_that_another_program_cut_into_a_fan_is_refused(tmp_path:
         cap = np.column_stack([ring, np.full(len(ring), z)])
         fans += [np.array([cap[0], cap[k], cap[k + 1]])[::way] for k in range(1, len(cap) - 1)]
     with pytest.raises(InputError, match="folds back onto itself"):
-        raw_solids(write_triangles(np.concatenate([sides, fans]), tmp_path / "a.stl"), None)
-    assert len(raw_solids(write_stl(prism(U_SHAPE, 20), tmp_path / "b.stl"), None)[1]) == 1
+        read_raw_solids(write_triangles(np.concatenate([sides, fans]), tmp_path / "a.stl"), None)
+    assert len(read_raw_solids(write_stl(prism(U_SHAPE, 20), tmp_path / "b.stl"), None)[1]) == 1

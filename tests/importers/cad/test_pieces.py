@@ -8,9 +8,9 @@ from manifold3d import CrossSection, Manifold
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.faces.regions import find_regions
-from apo_bench.importers.cad.near_points import coming_near, surface_points
-from apo_bench.importers.cad.pieces.convex_cutting import cut
-from apo_bench.importers.cad.pieces.hollow_parts import depths
+from apo_bench.importers.cad.near_points import find_near_points, sample_surface_points
+from apo_bench.importers.cad.pieces.convex_cutting import cut_solid
+from apo_bench.importers.cad.pieces.hollow_parts import measure_depths
 from apo_bench.importers.cad.solids import RawSolid, SolidPlace, convert_to_mesh, name_regions
 from tests.importers.cad.made import block
 
@@ -36,24 +36,24 @@ BOWL = block(40, 40, 12) - Manifold.sphere(20, 48).translate((0, 0, 26))
 
 def misfit(raw: RawSolid, pieces: tuple[Hull, ...]) -> tuple[float, float]:
     """How deep the surface lies inside of a piece at most, and how far off every piece, [mm]."""
-    points = surface_points(raw.mesh, 0.5)
-    deepest = np.max([depths(points, piece.planes * [1.0, 1.0, 1.0, 1e3]) for piece in pieces], axis=0)
+    points = sample_surface_points(raw.mesh, 0.5)
+    deepest = np.max([measure_depths(points, piece.planes * [1.0, 1.0, 1.0, 1e3]) for piece in pieces], axis=0)
     return float(deepest.max()), float(-deepest.min())
 
 
 @pytest.mark.parametrize("body", [SOCKET, BOWL], ids=["socket", "bowl"])
 def test_pieces_lie_inside_of_a_hollow_solid(body: Manifold) -> None:
     raw = raw_of("part", body)
-    out, left = misfit(raw, cut(raw).pieces)
+    out, left = misfit(raw, cut_solid(raw).pieces)
     assert out < 0.025
     assert left < 0.2
 
 
 def test_what_fits_as_drawn_fits_as_pieces() -> None:
     raws = [raw_of("socket", SOCKET), raw_of("plug", PLUG)]
-    near = coming_near(raws)
+    near = find_near_points(raws)
     bodies = [
-        sum((Manifold.hull_points(1e3 * piece.corners) for piece in cut(raw, others).pieces), Manifold())
+        sum((Manifold.hull_points(1e3 * piece.corners) for piece in cut_solid(raw, others).pieces), Manifold())
         for raw, others in zip(raws, near, strict=True)
     ]
     assert (SOCKET ^ PLUG).volume() == 0.0

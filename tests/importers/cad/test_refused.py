@@ -13,7 +13,7 @@ from manifold3d import Manifold
 from apo_bench import InputError
 from apo_bench.cli.app import main
 from apo_bench.importers.cad import part_import
-from apo_bench.importers.cad.part_import import import_solid, raw_solids
+from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
 from tests.importers.cad.made import block, rod, write_stl, write_triangles
 
 
@@ -51,7 +51,7 @@ def test_what_is_no_part_is_refused_in_one_sentence(
 ) -> None:
     make, sentence = REFUSED[case]
     with pytest.raises(InputError, match=sentence) as raised:
-        raw_solids(make(tmp_path), None)
+        read_raw_solids(make(tmp_path), None)
     assert "\n" not in str(raised.value)
     assert main(["part", "import", str(tmp_path / "none.stl"), "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -59,7 +59,7 @@ def test_what_is_no_part_is_refused_in_one_sentence(
 
 def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It took two minutes and all the memory."""
-    (raw,) = raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
+    (raw,) = read_raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
     monkeypatch.setattr(part_import, "cut", None)
     with pytest.raises(InputError, match="no face of the part is flat or round"):
         import_solid(raw, "a", tmp_path, "a.stl")
@@ -71,14 +71,16 @@ def shells(*given: Any) -> Any:
 
 def test_shells_that_go_through_each_other_are_united_and_it_is_said(tmp_path: Path) -> None:
     path = write_triangles(shells(block(20, 20, 20), block(10, 10, 40, (3, 2, -7))), tmp_path / "a.stl")
-    _, (raw,) = raw_solids(path, None)
+    _, (raw,) = read_raw_solids(path, None)
     assert raw.mesh.volume == pytest.approx(8000 + 10 * 10 * 20)
     assert raw.repairs == ("2 closed shells, some of which go through each other, became 1",)
 
 
 @pytest.mark.parametrize("at", [(20, 0, 0), (0, 0, 20), (20, 20, 0), (20, 5, 3)])
 def test_solids_that_touch_stay_two(at: tuple[float, float, float], tmp_path: Path) -> None:
-    _, raws = raw_solids(write_triangles(shells(block(20, 20, 20), block(20, 20, 20, at)), tmp_path / "a.stl"), None)
+    _, raws = read_raw_solids(
+        write_triangles(shells(block(20, 20, 20), block(20, 20, 20, at)), tmp_path / "a.stl"), None
+    )
     assert [len(raw.places) for raw in raws] == [2]
     assert raws[0].mesh.volume == pytest.approx(8000)
 
@@ -87,7 +89,7 @@ def test_a_solid_whose_surface_crosses_itself_becomes_no_part(tmp_path: Path) ->
     """A corner of a block is drawn through its floor."""
     given = triangles(block(20, 20, 20))
     given[(given == (10, 10, 20)).all(axis=2)] = (0, 0, -10)
-    _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
+    _, (raw,) = read_raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
     with pytest.raises(InputError, match="its surface may cross itself"):
         import_solid(raw, "a", tmp_path, "a.stl")
 
@@ -96,12 +98,12 @@ def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
     given = triangles(block(20, 20, 20))
     given[::3] = given[::3, ::-1]
     with pytest.raises(InputError, match="neighbouring triangles face different ways"):
-        raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
+        read_raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
 
 
 def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:
     mesh = block(30, 30, 5, (0, 0, -10)) + Manifold.sphere(10, 32)
-    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    _, (raw,) = read_raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
     done = import_solid(raw, "ball", tmp_path, "a.stl")
     assert sum(region.kind == "other" for region in raw.regions) == 1
     assert done.cut.hulls == 1

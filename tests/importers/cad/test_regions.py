@@ -13,7 +13,7 @@ import trimesh
 from manifold3d import CrossSection, Manifold
 
 from apo_bench.importers.cad.faces.regions import find_regions
-from apo_bench.importers.cad.meshes.shells import closed_solids
+from apo_bench.importers.cad.meshes.shells import split_into_solids
 from apo_bench.importers.cad.solids import Mesh, Region, convert_to_mesh
 from tests.importers.cad.made import block, rod
 
@@ -22,7 +22,7 @@ def found(drawn: Any) -> tuple[Region, ...]:
     """The faces of a solid, once corners in flat pieces are left out."""
     is_body = isinstance(drawn, Manifold)
     mesh = convert_to_mesh(drawn) if is_body else Mesh(np.asarray(drawn.vertices, dtype=float), np.asarray(drawn.faces))
-    (solid,) = closed_solids(Path("a.stl"), "a", mesh)
+    (solid,) = split_into_solids(Path("a.stl"), "a", mesh)
     return find_regions(solid.mesh)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench.importers.cad.part_import import import_solid, raw_solids
-from apo_bench.importers.cad.part_report import part_lines, report_part
+from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
+from apo_bench.importers.cad.part_report import format_part_report, report_part
 from apo_bench.importers.cad.solids import RawSolid
 from tests.importers.cad.made import write_triangles
 
@@ -20,7 +20,7 @@ def prism(sides: int) -> Any:
 
 
 def found(drawn: Any, folder: Path, *fewest: int) -> RawSolid:
-    _, (raw,) = raw_solids(write_triangles(drawn.triangles, folder / "a.stl"), "mm", *fewest)
+    _, (raw,) = read_raw_solids(write_triangles(drawn.triangles, folder / "a.stl"), "mm", *fewest)
     return raw
 
 
@@ -35,5 +35,5 @@ def test_so_many_sides_are_round_and_fewer_are_flat(sides: int, fewest: int, rou
     assert len(done.solid.rounds) == round_ones
     volume = np.pi * 25 * 40 if round_ones else sides / 2 * np.sin(2 * np.pi / sides) * 25 * 40
     assert 1e9 * done.solid.volume == pytest.approx(volume, rel=1e-4)
-    said = "\n".join(part_lines(report_part(done)))
+    said = "\n".join(format_part_report(report_part(done)))
     assert (f"cylinder of {sides} sides, radius 5 mm" in said) == bool(round_ones)

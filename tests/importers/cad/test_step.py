@@ -13,7 +13,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.cad.part_import import ImportedPart, import_solid, raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, read_raw_solids
 from apo_bench.importers.cad.step.brep import read_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from tests.importers.cad.held import hold
@@ -125,26 +125,26 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     path = write_step(Box(30, 20, 10), tmp_path / "a.step")
     text = path.read_text().replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)")
     path.write_text(text)
-    file, (raw,) = raw_solids(path, None)
+    file, (raw,) = read_raw_solids(path, None)
     assert file.unit == "cm"
     assert raw.mesh.extent == pytest.approx(300.0)
     path.write_text(text.replace("SI_UNIT(.CENTI.,.METRE.)", "SI_UNIT($,.METRE.)"))
     with pytest.raises(InputError, match=r"is 3e\+04 mm .of a solid in it; unit m, stated in the file."):
-        raw_solids(path, None)
+        read_raw_solids(path, None)
 
 
 def test_files_that_are_no_step_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.stp"
     path.touch()
     with pytest.raises(InputError, match="the file is empty"):
-        raw_solids(path, None)
+        read_raw_solids(path, None)
     path.write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match="no STEP file"):
-        raw_solids(path, None)
+        read_raw_solids(path, None)
     path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=GARBAGE(#2);\nENDSEC;\nEND-ISO-10303-21;\n")
     with pytest.raises(InputError, match=r"holds no solid|cannot be read"):
-        raw_solids(path, None)
+        read_raw_solids(path, None)
     path.unlink()
     os.mkfifo(path)
     with pytest.raises(InputError, match="a pipe was given"):
-        raw_solids(path, None)
+        read_raw_solids(path, None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError
-from apo_bench.importers.cad.part_import import raw_solids
+from apo_bench.importers.cad.part_import import read_raw_solids
 from tests.importers.cad.made import block, write_stl
 
 
@@ -32,7 +32,7 @@ READ: dict[str, Callable[[bytes], bytes]] = {
 @pytest.mark.parametrize("case", READ)
 def test_triangles_are_read_in_spite_of_a_wrong_count(case: str, tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(READ[case](brick(tmp_path)))
-    _, (raw,) = raw_solids(tmp_path / "a.stl", None)
+    _, (raw,) = read_raw_solids(tmp_path / "a.stl", None)
     assert raw.mesh.volume == pytest.approx(6000.0)
 
 
@@ -47,4 +47,4 @@ def test_what_cannot_be_read_is_refused_with_its_cause(case: str, tmp_path: Path
     change, sentence = REFUSED[case]
     (tmp_path / "a.stl").write_bytes(change(brick(tmp_path)))
     with pytest.raises(InputError, match=sentence):
-        raw_solids(tmp_path / "a.stl", None)
+        read_raw_solids(tmp_path / "a.stl", None)

@@ -18,7 +18,7 @@ from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit
 from apo_bench.perception.observation.models.empirical import format_residuals
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.models.truncated_tails import StudentT, TruncatedTails
-from apo_bench.viz.fit_text import fit_form
+from apo_bench.viz.fit_text import make_fit_form
 from tests import bop_made as made_of
 from tests.bop_made import Known
 
@@ -97,7 +97,7 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     for mine, known in ((measured.shift_mm, plain.shift_mm), (measured.turn_deg, plain.turn_deg)):
         assert_allclose([*mine.across, *mine.along], [*known.across, *known.along], rtol=0.1)
     assert all(figures.distance < 1.2 * figures.by_chance for figures in compute_goodness_of_fit(residuals, measured))
-    assert fit_form(residuals, measured, compute_goodness_of_fit(residuals, measured))["round_objects"] == [3]
+    assert make_fit_form(residuals, measured, compute_goodness_of_fit(residuals, measured))["round_objects"] == [3]
 
 
 def test_estimates_are_folded_by_the_symmetries_of_the_models(tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> 
     """Median and more of MegaPose on LM-O. Angles by the trace of matrices as written are what was published of it;
     the truth is scaled by up to half a percent, so nearest rotations are farther apart in the lower quartile."""
     measured = fit_noise(lmo, "LM-O")
-    form = fit_form(lmo, measured, compute_goodness_of_fit(lmo, measured))
+    form = make_fit_form(lmo, measured, compute_goodness_of_fit(lmo, measured))
     assert (form["found"], form["parts"]) == (1205, 1445)
     assert form["inliers"] / form["found"] == pytest.approx(0.82, rel=0.01)
     assert_allclose(form["inlier_across_mm"][1:4], [4.2, 6.5, 9.4], rtol=0.1)

@@ -24,8 +24,8 @@ from apo_bench.perception.observation.models.outliers import UNOBSERVED_DEVIATIO
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import format_noise_file, list_presets, read_noise
-from apo_bench.trial.fingerprint import config_hash
-from apo_bench.trial.input_files import noise_content
+from apo_bench.trial.fingerprint import compute_config_hash
+from apo_bench.trial.input_files import hash_noise_files
 from tests import bop_made as made_of
 from tests import scenes
 from tests.bop_made import Known
@@ -166,10 +166,10 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
     for i, source in enumerate(("whole", "inliers")):
         path.write_bytes((folder / f"{source}.csv").read_bytes())
         os.utime(path, ns=(i, i))
-        hashed = config_hash(TrialConfig("stick_in_tower", noise=name), "content")
-        seen.append((see(name, 0).poses.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
+        hashed = compute_config_hash(TrialConfig("stick_in_tower", noise=name), "content")
+        seen.append((see(name, 0).poses.tobytes(), hashed, hash_noise_files(name)[f"noise {name}"]))
     assert all(first != second for first, second in zip(*seen, strict=True))
-    assert noise_content("isotropic", "anisotropic", "package.module:name") == {}
+    assert hash_noise_files("isotropic", "anisotropic", "package.module:name") == {}
 
 
 def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> None:

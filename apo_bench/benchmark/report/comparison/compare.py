@@ -18,12 +18,12 @@ from apo_bench.benchmark.analysis import (
     make_sort_key,
     tally,
 )
-from apo_bench.benchmark.report.trial_text import NUMBERS, verdict, why
+from apo_bench.benchmark.report.trial_text import NUMBERS, describe_failure, describe_verdict
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.records import KEY, SETTINGS, describe_secret_seed, get_record_key
-from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
+from apo_bench.records.run.replay_command import format_replay_command
+from apo_bench.records.run.run_file import list_scenario_files, read_limits, read_run
 from apo_bench.records.run.trials import Index, Mask, Trials, pair_groups, read_trials
 
 _ENDING = ("success", "failure_stage", "failure_code")  # columns that must agree for the same ending
@@ -104,28 +104,28 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     return Comparison(
         first=a,
         second=b,
-        differences=_differences(a, b),
+        differences=_list_differences(a, b),
         shared=len(x),
         alone=(len(first_at) - len(x), len(second_at) - len(x)),
-        agreements=_agreements(x, y),
-        changed=_changed(a._replace(trials=x), b._replace(trials=y)),
-        numbers=_number_changes(x, y),
-        identical=int(_same(x, y, _RESULT).sum()),
-        conditions=_conditions(a.trials, b.trials, x, y),
+        agreements=_list_agreements(x, y),
+        changed=_list_changed_trials(a._replace(trials=x), b._replace(trials=y)),
+        numbers=_list_number_changes(x, y),
+        identical=int(_are_equal(x, y, _RESULT).sum()),
+        conditions=_compare_conditions(a.trials, b.trials, x, y),
     )
 
 
-def _differences(first: Side, second: Side) -> list[Line]:
+def _list_differences(first: Side, second: Side) -> list[Line]:
     """Return settings and versions that differ; if a `run.json` is missing, only those of the records."""
     if not (first.run and second.run):
         first, second = (s._replace(run={"run.json can be read": bool(s.run) or None}) for s in (first, second))
-    ours = _settings_of(first)
-    theirs = _settings_of(second)
+    ours = _list_settings(first)
+    theirs = _list_settings(second)
     every = [{"what": name, "first": ours.get(name), "second": theirs.get(name)} for name in {**ours, **theirs}]
     return [line for line in every if line["first"] != line["second"]]
 
 
-def _settings_of(side: Side) -> dict[str, Any]:
+def _list_settings(side: Side) -> dict[str, Any]:
     """Return settings by name: from `run.json`, with its tables flattened by one level, and from the records."""
     tables = {f"grid {i}": grid for i, grid in enumerate(side.run.get("grids", ()), start=1)}
     tables |= {name: value for name, value in side.run.items() if isinstance(value, dict)}
@@ -147,7 +147,7 @@ def _check_once(side: Side, keys: Index) -> None:
         )
 
 
-def _same(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
+def _are_equal(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
     """Return a mask, (n,), of the trials whose values agree exactly in all these columns."""
     same = np.ones(len(a), dtype=bool)
     for name in names:
@@ -155,40 +155,42 @@ def _same(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
     return same
 
 
-def _agreements(a: Trials, b: Trials) -> list[Line]:
+def _list_agreements(a: Trials, b: Trials) -> list[Line]:
     """Return lines on the agreement per scenario, and one over all scenarios at the end."""
     # the demonstration succeeded in at least one sweep
     counts = ~(np.isnan(a.number("success")) & np.isnan(b.number("success")))
     masks = {name: counts & a.holds("scenario", (name,).__contains__) for name in sorted(a.distinct("scenario"))}
     masks[ALL] = counts
-    return [_agreement(name, a.where(own), b.where(own)) for name, own in masks.items() if own.any() or name == ALL]
+    return [
+        _measure_agreement(name, a.where(own), b.where(own)) for name, own in masks.items() if own.any() or name == ALL
+    ]
 
 
-def _agreement(scenario: str, a: Trials, b: Trials) -> Line:
+def _measure_agreement(scenario: str, a: Trials, b: Trials) -> Line:
     """Return the line on how often two sweeps agree, from their shared trials in the same order."""
-    same = _same(a, b, ("success",))
+    same = _are_equal(a, b, ("success",))
     seeds, of = np.unique(a.number("seed"), return_inverse=True)
     alike = np.bincount(of, ~same, minlength=len(seeds)) == 0  # seeds without any differing verdict
     return {
         "scenario": scenario,
         "trials": len(same),
-        **_share("same_verdict", int(same.sum()), len(same)),
+        **_make_share("same_verdict", int(same.sum()), len(same)),
         "seeds": len(seeds),
-        **_share("same_verdicts_in_all", int(alike.sum()), len(seeds)),
-        "same_stage_and_code": int(_same(a, b, _ENDING).sum()),
-        **_verdicts(a.number("success"), b.number("success")),
+        **_make_share("same_verdicts_in_all", int(alike.sum()), len(seeds)),
+        "same_stage_and_code": int(_are_equal(a, b, _ENDING).sum()),
+        **_count_verdicts(a.number("success"), b.number("success")),
         "excluded_in_one": int((np.isnan(a.number("success")) != np.isnan(b.number("success"))).sum()),
     }
 
 
-def _share(name: str, successes: int, trials: int) -> Line:
+def _make_share(name: str, successes: int, trials: int) -> Line:
     """Return columns with a count, its rate, and Wilson's interval."""
     rate = Rate(successes, trials)
     low, high = rate.interval
     return {name: successes, f"{name}_rate": rate.rate, f"{name}_low_95": low, f"{name}_high_95": high}
 
 
-def _verdicts(x: Array, y: Array) -> Line:
+def _count_verdicts(x: Array, y: Array) -> Line:
     """Return counts of trials that succeed in one sweep only, and the difference of success, second minus first.
 
     Args:
@@ -208,31 +210,31 @@ def _verdicts(x: Array, y: Array) -> Line:
     }
 
 
-def _changed(first: Side, second: Side) -> list[Line]:
+def _list_changed_trials(first: Side, second: Side) -> list[Line]:
     """Return the trials whose verdicts differ, sorted by condition, then by seed."""
-    unlike = ~_same(first.trials, second.trials, ("success",))
+    unlike = ~_are_equal(first.trials, second.trials, ("success",))
     pairs = zip(first.trials.where(unlike).rows(), second.trials.where(unlike).rows(), strict=True)
     lines = [
         dict(zip(KEY, get_record_key(x), strict=True))
-        | {"condition": get_condition(x), "first": _ending(x, first), "second": _ending(y, second)}
+        | {"condition": get_condition(x), "first": _describe_ending(x, first), "second": _describe_ending(y, second)}
         for x, y in pairs
     ]
     return sorted(lines, key=lambda line: (*make_sort_key(line["condition"]), line["seed"]))
 
 
-def _ending(record: Mapping[str, Any], side: Side) -> Line:
+def _describe_ending(record: Mapping[str, Any], side: Side) -> Line:
     """Return how a trial ended in one sweep, and the command to run it again."""
     return {
-        "verdict": verdict(record),
-        "why": why(record),
+        "verdict": describe_verdict(record),
+        "why": describe_failure(record),
         "stage": record["failure_stage"],
         "code": record["failure_code"],
         "sentence": record["sentence"],
-        "command": replay_command(record, scenario_files(side.run), limits_of(side.run)),
+        "command": format_replay_command(record, list_scenario_files(side.run), read_limits(side.run)),
     }
 
 
-def _number_changes(a: Trials, b: Trials) -> list[Line]:
+def _list_number_changes(a: Trials, b: Trials) -> list[Line]:
     """Return a line for each number that occurs in a record: in how many trials it differs, and by how much at most."""
     lines = []
     for name in NUMBERS:
@@ -246,14 +248,14 @@ def _number_changes(a: Trials, b: Trials) -> list[Line]:
     return [line for line in lines if line["both"] or line["alone"]]
 
 
-def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Line]:
+def _compare_conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Line]:
     """Return the rates in each condition, sorted as `tally` sorts, whatever the fidelity.
 
     Args:
         first, second: All trials of each sweep.
         a, b: The shared trials, in the same order.
     """
-    ours, theirs = ({_at_any_fidelity(c.condition): c for c in tally(trials)} for trials in (first, second))
+    ours, theirs = ({_ignore_fidelity(c.condition): c for c in tally(trials)} for trials in (first, second))
     # condition -> indices of its shared trials
     groups = a.groups(name for name in CONDITION_FIELDS if name != "fidelity")
     fields = [dict(zip((n for n in CONDITION_FIELDS if n != "fidelity"), key, strict=True)) for key in groups.keys]
@@ -263,10 +265,10 @@ def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Lin
     x = a.number("success")
     y = b.number("success")
     return [
-        {"condition": c, "first": ours.get(c), "second": theirs.get(c), **_verdicts(x[own], y[own])}
+        {"condition": c, "first": ours.get(c), "second": theirs.get(c), **_count_verdicts(x[own], y[own])}
         for c, own in of.items()
     ]
 
 
-def _at_any_fidelity(condition: Condition) -> Condition:
+def _ignore_fidelity(condition: Condition) -> Condition:
     return condition.with_default("fidelity")

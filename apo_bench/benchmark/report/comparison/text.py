@@ -6,9 +6,9 @@ from typing import Any
 
 from apo_bench.benchmark.analysis import FEWEST_SEEDS, Interval, Line, format_percent, format_percent_interval
 from apo_bench.benchmark.report.comparison.compare import Comparison
-from apo_bench.benchmark.report.page.page import Section, page
-from apo_bench.benchmark.report.run_facts import value_words
-from apo_bench.benchmark.report.tables.table import Table, TableColumn, fill
+from apo_bench.benchmark.report.page.page import Section, render_page
+from apo_bench.benchmark.report.run_facts import format_setting
+from apo_bench.benchmark.report.tables.table import Table, TableColumn, make_template
 from apo_bench.benchmark.report.trial_text import NUMBERS
 from apo_bench.errors import InputError
 from apo_bench.io import format_count, write_file
@@ -28,7 +28,7 @@ _CONDITIONS = (
 _MOST_LISTED = 2000
 """Most changed trials that are listed."""
 # template of a difference with its interval
-_DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
+_DIFFERENCE = make_template("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
 _WHERE = (  # columns that identify a condition
     TableColumn("scenario", "scenario", "condition.scenario", words=True),
     TableColumn("conditions", "conditions", "condition.description", words=True),
@@ -37,34 +37,34 @@ _WHERE = (  # columns that identify a condition
 )
 
 
-def comparison_tables(comparison: Comparison) -> dict[str, Table]:
+def make_comparison_tables(comparison: Comparison) -> dict[str, Table]:
     """Return the tables by the name of their file: agreement, numbers, conditions, changed, differences."""
     agreement = (
         TableColumn("scenario", "scenario", words=True),
         TableColumn("trials", "trials"),
-        TableColumn("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
-        TableColumn("95 %", "95 %", fill(_between("same_verdict"))),
+        TableColumn("same verdict", "same verdict", make_template("{same_verdict} ({same_verdict_rate:percent2})")),
+        TableColumn("95 %", "95 %", make_template(_format_range("same_verdict"))),
         TableColumn("seeds", "seeds"),
         TableColumn(
-            "same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")
+            "same in all", "same in all", make_template("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")
         ),
-        TableColumn("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
+        TableColumn("95 % 2", "95 %", make_template(_format_range("same_verdicts_in_all"))),
         TableColumn("same stage and code", "same stage and code", "same_stage_and_code"),
         TableColumn("right in the first alone", "right in the first alone", "right_in_first_alone"),
         TableColumn("right in the second alone", "right in the second alone", "right_in_second_alone"),
         TableColumn("difference of success [points]", "difference of success [points]", _DIFFERENCE),
     )
     numbers = (
-        TableColumn("number", "number", _label, words=True),
+        TableColumn("number", "number", _format_label, words=True),
         TableColumn("trials", "trials", "both"),
         TableColumn("differ", "differ"),
-        TableColumn("largest difference", "largest difference", fill("{most:.3g}")),
+        TableColumn("largest difference", "largest difference", make_template("{most:.3g}")),
         TableColumn("in one alone", "in one alone", "alone"),
     )
     conditions = (
         *_WHERE,
-        TableColumn("first", "first", fill("{first.rate:percent}, n {first.trials}")),
-        TableColumn("second", "second", fill("{second.rate:percent}, n {second.trials}")),
+        TableColumn("first", "first", make_template("{first.rate:percent}, n {first.trials}")),
+        TableColumn("second", "second", make_template("{second.rate:percent}, n {second.trials}")),
         TableColumn("shared", "shared"),
         TableColumn("first alone", "first alone", "right_in_first_alone"),
         TableColumn("second alone", "second alone", "right_in_second_alone"),
@@ -73,9 +73,9 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     changed = (
         *_WHERE,
         TableColumn("seed", "seed", words=True),
-        TableColumn("first", "first", fill("{first.verdict} {first.why}"), words=True),
+        TableColumn("first", "first", make_template("{first.verdict} {first.why}"), words=True),
         TableColumn("in words", "in words", "first.sentence", words=True),
-        TableColumn("second", "second", fill("{second.verdict} {second.why}"), words=True),
+        TableColumn("second", "second", make_template("{second.verdict} {second.why}"), words=True),
         TableColumn("in words 2", "in words", "second.sentence", words=True),
         TableColumn("command of the first", "command of the first", "first.command", words=True),
         TableColumn("command of the second", "command of the second", "second.command", words=True),
@@ -83,8 +83,8 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     first, second = (str(side.folder) for side in (comparison.first, comparison.second))
     differences = (
         TableColumn("what", "what", words=True),
-        TableColumn(first, first, _side("first"), words=True),
-        TableColumn(second, second, _side("second"), words=True),
+        TableColumn(first, first, _format_side("first"), words=True),
+        TableColumn(second, second, _format_side("second"), words=True),
     )
     return {
         "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
@@ -95,15 +95,17 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     }
 
 
-def in_words(comparison: Comparison) -> str:
+def describe_comparison(comparison: Comparison) -> str:
     """Summarise a comparison in some sentences, counts first."""
     first, second = comparison.alone
-    shared = f"{_trials(comparison.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
-    identical = f"{_trials(comparison.identical)} the same to the last digit."
-    return f"{shared} {_agreed(comparison.agreements[-1])} {identical}"
+    shared = (
+        f"{_format_trials(comparison.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
+    )
+    identical = f"{_format_trials(comparison.identical)} the same to the last digit."
+    return f"{shared} {_describe_agreement(comparison.agreements[-1])} {identical}"
 
 
-def _agreed(total: Line) -> str:
+def _describe_agreement(total: Line) -> str:
     """Return how many verdicts agree, and at how many seeds all verdicts agree; only seeds are independent."""
     if not total["trials"]:
         return "None of them counts: no demonstration was right itself."
@@ -127,7 +129,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
     Raises:
         InputError: The folder cannot be written.
     """
-    tables = comparison_tables(comparison)
+    tables = make_comparison_tables(comparison)
     folders = [str(side.folder) for side in (comparison.first, comparison.second)]
     names = [Path(each).resolve().name for each in folders]
     count = len(comparison.changed)
@@ -140,7 +142,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
         Section("rates", "Rates", [("table", tables["conditions"])]),
         Section("differences", "What is not the same", [("table", tables["differences"])]),
     ]
-    html = page(" against ".join(names), in_words(comparison), folders, sections)
+    html = render_page(" against ".join(names), describe_comparison(comparison), folders, sections)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, table in tables.items():
@@ -151,7 +153,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
     return folder / "compare.html"
 
 
-def comparison_form(comparison: Comparison) -> dict[str, Any]:
+def make_comparison_form(comparison: Comparison) -> dict[str, Any]:
     """Return a comparison as a JSON object."""
     return {
         "schema": "apo-bench/comparison/1",
@@ -169,20 +171,20 @@ def comparison_form(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _between(name: str) -> str:
+def _format_range(name: str) -> str:
     """Return a template for an interval, from its lower to its upper end."""
     return f"{{{name}_low_95:hundredths}} to {{{name}_high_95:hundredths}} %"
 
 
-def _label(line: Line) -> str:
+def _format_label(line: Line) -> str:
     """Return the name of a record's number for people."""
     return NUMBERS[line["name"]]
 
 
-def _trials(n: int) -> str:
+def _format_trials(n: int) -> str:
     return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
-def _side(name: str) -> Callable[[Line], str]:
+def _format_side(name: str) -> Callable[[Line], str]:
     """Return a function that formats the value of a setting in one sweep, `first` or `second`."""
-    return lambda line: "not said" if line[name] is None else value_words(line[name])
+    return lambda line: "not said" if line[name] is None else format_setting(line[name])

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw
+from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw_figure
 from apo_bench.benchmark.report.figures.style import COLORS, SOFT
 
 _BAR = 0.2
@@ -16,7 +16,7 @@ Shares = Mapping[str, Mapping[str, int]]
 """Name of a bar -> its sections -> their counts."""
 
 
-def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
+def draw_bars(title: str, panels: Mapping[str, Shares]) -> Figure:
     """Draw one panel of stacked bars for each entry.
 
     Sections have the order of `COLORS`; others are grey and come last.
@@ -25,11 +25,11 @@ def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
 
     met = {part for bars in panels.values() for parts in bars.values() for part in parts}
     ordered = [*(part for part in COLORS if part in met), *sorted(met - set(COLORS))]
-    drawn = [_panel(name, bars, ordered) for name, bars in panels.items()]
-    return draw(title, drawn, {part: Patch(color=COLORS.get(part, SOFT)) for part in ordered})
+    drawn = [_draw_panel(name, bars, ordered) for name, bars in panels.items()]
+    return draw_figure(title, drawn, {part: Patch(color=COLORS.get(part, SOFT)) for part in ordered})
 
 
-def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> FigurePanel:
+def _draw_panel(title: str, bars: Shares, ordered: Sequence[str]) -> FigurePanel:
     """Return a panel of stacked bars; each bar is normalised to 1, with its count at the right."""
     names = [name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…" for name in bars]
     totals = [sum(parts.values()) for parts in bars.values()]

@@ -15,8 +15,8 @@ from apo_bench.benchmark.analysis import (
     group_by_setting,
     list_levels,
 )
-from apo_bench.benchmark.report.figures.bars import Shares, bar_figure
-from apo_bench.benchmark.report.figures.lines import Axes, IntervalMark, line_figure
+from apo_bench.benchmark.report.figures.bars import Shares, draw_bars
+from apo_bench.benchmark.report.figures.lines import Axes, IntervalMark, draw_lines
 from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.records import knows_truth, may_reobserve
 
@@ -24,7 +24,7 @@ _FLOOR_MM = 1e-3
 """Smaller gaps are drawn at this value, since they are residuals of solvers."""
 
 
-def figures(
+def draw_figures(
     results: Sequence[ConditionResult],
     pairs: Sequence[PairedComparison],
     settings: Sequence[Condition],
@@ -45,41 +45,41 @@ def figures(
     lines = {
         "success_over_noise_level": (
             "Success over noise level",
-            _over_level(by_setting),
+            _draw_over_level(by_setting),
             Axes(level, "success", "percent"),
         ),
-        "success_over_tightness": ("Success over tightness", _over_tightness(results), tightness),
+        "success_over_tightness": ("Success over tightness", _draw_over_tightness(results), tightness),
         "success_over_reobservations": (
             "Success over reobservations",
-            _over_reobservations(results),
+            _draw_over_reobservations(results),
             Axes("reobservations allowed", "success", "percent"),
         ),
         "gap_before_and_after": (
             "Gap of the contacts, observed and planned",
-            _gaps(settings, gaps),
+            _draw_gaps(settings, gaps),
             Axes(level, "gap [mm]", "log"),
         ),
-        "detected": ("Detected contacts", _detected(detections), Axes("noise level", "share", "percent")),
-        "timing": ("Wall time of a trial", _times(times), Axes("method", "wall time [s]")),
+        "detected": ("Detected contacts", _draw_detection(detections), Axes("noise level", "share", "percent")),
+        "timing": ("Wall time of a trial", _draw_times(times), Axes("method", "wall time [s]")),
     }
     for reference in dict.fromkeys(p.reference for p in pairs):
         own = [p for p in pairs if p.reference == reference and p.pairs and p.condition.method != "uncorrected"]
         marks = [
-            _mark(s, p.condition, p.difference or 0.0, *p.interval)
+            _make_mark(s, p.condition, p.difference or 0.0, *p.interval)
             for s, inside in group_by_setting(settings, own).items()
             for p in inside
         ]
         title = f"Difference of success to {reference}, same seeds"
         lines[f"difference_to_{reference}"] = (title, marks, Axes(level, "difference [points]", "points"))
     bars = {
-        "failure_stages": ("Stages of failures", _stages(by_setting)),
-        "prediction": ("Predicted against real failure", _predicted(confusions)),
+        "failure_stages": ("Stages of failures", _draw_stages(by_setting)),
+        "prediction": ("Predicted against real failure", _draw_predictions(confusions)),
     }
-    drawn = {name: line_figure(title, marks, axes) for name, (title, marks, axes) in lines.items() if marks}
-    return drawn | {name: bar_figure(title, panels) for name, (title, panels) in bars.items() if panels}
+    drawn = {name: draw_lines(title, marks, axes) for name, (title, marks, axes) in lines.items() if marks}
+    return drawn | {name: draw_bars(title, panels) for name, (title, panels) in bars.items() if panels}
 
 
-def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[IntervalMark]:
+def _draw_over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[IntervalMark]:
     """Mark success for each setting with two noise levels or more; if there is none, for each setting.
 
     The oracle, which noise does not affect, is marked at every level.
@@ -87,7 +87,7 @@ def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> li
     levels = {s: list_levels(own) for s, own in by_setting.items()}
     least = min(2, max(map(len, levels.values()), default=1))
     return [
-        IntervalMark(_title(s, own), c.method, level, format_noise(level, s.noise), c.rate, *c.interval)
+        IntervalMark(_format_title(s, own), c.method, level, format_noise(level, s.noise), c.rate, *c.interval)
         for s, own in by_setting.items()
         for c in own
         if len(levels[s]) >= max(1, least) and c.rate is not None
@@ -95,27 +95,27 @@ def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> li
     ]
 
 
-def _title(setting: Condition, results: Sequence[ConditionResult]) -> str:
+def _format_title(setting: Condition, results: Sequence[ConditionResult]) -> str:
     """Return the title of a setting with the range of its numbers of trials."""
     trials = [c.trials for c in results]
     return f"{setting.title}; n\u00a0{' to '.join(map(str, dict.fromkeys((min(trials), max(trials)))))}"
 
 
-def _gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[IntervalMark]:
+def _draw_gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[IntervalMark]:
     """Mark the observed gaps, once for all methods, since these share them, and the planned gaps of each method."""
     of = {line["condition"]: line for line in lines}
     here = [(s, condition) for s, inside in group_by_setting(settings, list(of)).items() for condition in inside]
-    observed = [_mark(s, replace(c, method="observed"), *_percentiles(of[c], "observed")) for s, c in here]
+    observed = [_make_mark(s, replace(c, method="observed"), *_list_percentiles(of[c], "observed")) for s, c in here]
     once = {mark[:3]: mark for mark in observed}  # one mark per panel and level
-    return [*once.values(), *(_mark(s, c, *_percentiles(of[c], "planned")) for s, c in here)]
+    return [*once.values(), *(_make_mark(s, c, *_list_percentiles(of[c], "planned")) for s, c in here)]
 
 
-def _percentiles(line: Line, of: str) -> list[float]:
+def _list_percentiles(line: Line, of: str) -> list[float]:
     """Return median, 5th and 95th percentile of a kind of gap, at least `_FLOOR_MM`."""
     return [max(line[f"{of}_{name}"], _FLOOR_MM) for name in ("median_mm", "5", "95")]
 
 
-def _detected(lines: Sequence[Line]) -> list[IntervalMark]:
+def _draw_detection(lines: Sequence[Line]) -> list[IntervalMark]:
     """Mark precision and recall of detected contacts, over all scenarios if there are several."""
     return [
         IntervalMark(
@@ -131,13 +131,13 @@ def _detected(lines: Sequence[Line]) -> list[IntervalMark]:
     ]
 
 
-def _times(lines: Sequence[Line]) -> list[IntervalMark]:
+def _draw_times(lines: Sequence[Line]) -> list[IntervalMark]:
     """Mark median, 5th and 95th percentile of the time of a trial."""
     names = ("trial_median_s", "trial_5_s", "trial_95_s")
     return [IntervalMark(line["scenario"], *[line["method"]] * 3, *(line[name] for name in names)) for line in lines]
 
 
-def _over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMark]:
+def _draw_over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMark]:
     """Mark success of all methods, if trials with several limits of reobservations exist."""
     several = len({c.max_reobservations for c in results if may_reobserve(c.method)}) > 1
     return [
@@ -154,7 +154,7 @@ def _over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMar
     ]
 
 
-def _over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
+def _draw_over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
     """Mark success of all clearances in one panel, if a scenario has several clearances."""
     several = len({(c.scenario, c.clearance_mm) for c in results}) > len({c.scenario for c in results})
     return [
@@ -166,15 +166,16 @@ def _over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
     ]
 
 
-def _stages(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> dict[str, Shares]:
+def _draw_stages(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> dict[str, Shares]:
     """Return a bar for every condition: success, then the stages of failures."""
     bars = {
-        s.title: {f"{c.method}, {c.noise_words}": _endings(c) for c in own if c.trials} for s, own in by_setting.items()
+        s.title: {f"{c.method}, {c.noise_words}": _count_endings(c) for c in own if c.trials}
+        for s, own in by_setting.items()
     }
     return {title: own for title, own in bars.items() if own}
 
 
-def _endings(result: ConditionResult) -> dict[str, int]:
+def _count_endings(result: ConditionResult) -> dict[str, int]:
     """Return success and stages of failures of a condition -> number of trials."""
     counts = {"success": result.successes} if result.successes else {}
     for why, count in result.failures.items():
@@ -183,7 +184,7 @@ def _endings(result: ConditionResult) -> dict[str, int]:
     return counts
 
 
-def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
+def _draw_predictions(lines: Sequence[Line]) -> dict[str, Shares]:
     """Return a bar for every scenario and method: combinations of prediction and result."""
     kinds = ("fit_fitted", "fit_failed", "fail_fitted", "fail_failed")
     bars = {
@@ -194,7 +195,7 @@ def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
     return {"predicted: result": bars} if bars else {}
 
 
-def _mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> IntervalMark:
+def _make_mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> IntervalMark:
     """Return the mark of a value with its interval at the noise level of a condition."""
     level = (condition.noise_mm, condition.noise_deg)
     return IntervalMark(setting.title, condition.method, level, format_noise(level, setting.noise), value, low, high)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw
-from apo_bench.benchmark.report.figures.style import Style, styles
+from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw_figure
+from apo_bench.benchmark.report.figures.style import Style, assign_styles
 from apo_bench.io import group_by
 
 _APART = 0.08
@@ -40,14 +40,16 @@ class Axes(NamedTuple):
     """`percent` from 0 to 100 %, `points` around a line at 0, `log`, or `plain`."""
 
 
-def line_figure(title: str, marks: Sequence[IntervalMark], axes: Axes) -> Figure:
+def draw_lines(title: str, marks: Sequence[IntervalMark], axes: Axes) -> Figure:
     """Draw a panel for each name that marks have, with a line for each method."""
-    looks = styles(list(dict.fromkeys(mark.line for mark in marks)))
+    looks = assign_styles(list(dict.fromkeys(mark.line for mark in marks)))
     panels = group_by((mark.panel, mark) for mark in marks)
-    return draw(title, [_panel(name, own, axes, looks) for name, own in panels.items()], _legend(looks))
+    return draw_figure(
+        title, [_draw_panel(name, own, axes, looks) for name, own in panels.items()], _make_legend(looks)
+    )
 
 
-def _panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[str, Style]) -> FigurePanel:
+def _draw_panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[str, Style]) -> FigurePanel:
     """Return a panel with the lines of its marks."""
     conditions = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
     labels = {conditions[mark.at]: mark.label for mark in marks}
@@ -57,16 +59,16 @@ def _panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[st
     def draw_lines(axis: Any) -> None:
         for i, (name, own) in enumerate(lines.items()):
             x = np.array([conditions[mark.at] for mark in own]) + step * (i - (len(lines) - 1) / 2)
-            _line(axis, x, own, looks[name])
+            _draw_line(axis, x, own, looks[name])
         axis.set_xticks(list(labels), list(labels.values()))
         axis.set_xlim(-0.5, len(conditions) - 0.5)
         axis.set(xlabel=axes.x, ylabel=axes.y)
-        _scale(axis, axes.kind)
+        _set_scale(axis, axes.kind)
 
     return FigurePanel(title, draw_lines)
 
 
-def _line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> None:
+def _draw_line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> None:
     """Draw a line with its interval band; a single mark has an interval bar."""
     order = np.argsort(x, kind="stable")
     value, low, high = np.array([mark[-3:] for mark in marks], dtype=float)[order].T  # the last three fields
@@ -77,7 +79,7 @@ def _line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> Non
         axis.fill_between(x[order], low, high, color=style.color, alpha=0.13, linewidth=0)
 
 
-def _scale(axis: Any, kind: str) -> None:
+def _set_scale(axis: Any, kind: str) -> None:
     """Set the scale of the vertical axis: `percent`, `points`, `log` or `plain`."""
     if kind == "percent":
         axis.set_ylim(-0.02, 1.02)
@@ -92,7 +94,7 @@ def _scale(axis: Any, kind: str) -> None:
         axis.yaxis.set_minor_formatter("")
 
 
-def _legend(looks: dict[str, Style]) -> dict[str, Any]:
+def _make_legend(looks: dict[str, Style]) -> dict[str, Any]:
     """Return name -> sample of the line for the legend."""
     from matplotlib.lines import Line2D
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.benchmark.report.figures.style import report_looks
+from apo_bench.benchmark.report.figures.style import list_report_styles
 from apo_bench.io import save_figure, write_file
 
 _ACROSS = 3
@@ -54,20 +54,20 @@ class Figure:
     def write(self, path: Path) -> Path:
         """Write the figure as PNG if the path ends in `.png`, else as SVG; return the path."""
         if path.suffix == ".png":
-            with report_looks(self.title):
+            with list_report_styles(self.title):
                 save_figure(self.canvas, path, dpi=110)
         else:
             write_file(path, self.svg)
         return path
 
 
-def draw(title: str, panels: Sequence[FigurePanel], legend: Mapping[str, Any]) -> Figure:
+def draw_figure(title: str, panels: Sequence[FigurePanel], legend: Mapping[str, Any]) -> Figure:
     """Draw panels in rows below a title and one legend.
 
     Args:
         legend: Name -> matplotlib artist that is its sample.
     """
-    with report_looks(title), warnings.catch_warnings():
+    with list_report_styles(title), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a box replaces a letter that the font does not have
         from matplotlib import figure as mpl
 

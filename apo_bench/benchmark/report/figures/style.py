@@ -83,14 +83,14 @@ _LOOKS: Any = {  # settings of matplotlib
 }
 
 
-def styles(names: Sequence[str]) -> dict[str, Style]:
+def assign_styles(names: Sequence[str]) -> dict[str, Style]:
     """Return a style for each name; names without a style of their own take those of `OWN_STYLES` in turn."""
     own = [name for name in names if name not in STYLES]
     return {name: STYLES[name] if name in STYLES else OWN_STYLES[own.index(name) % len(OWN_STYLES)] for name in names}
 
 
 @contextmanager
-def report_looks(secret_seed: str) -> Iterator[None]:
+def list_report_styles(secret_seed: str) -> Iterator[None]:
     """Draw with the settings of reports; `secret_seed` determines the ids of an SVG, so figures are reproducible."""
     with use_figure_style(_LOOKS | {"svg.hashsalt": secret_seed}):
         yield

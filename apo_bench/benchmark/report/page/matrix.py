@@ -21,20 +21,20 @@ from apo_bench.benchmark.analysis import (
     group_by_condition,
     list_levels,
 )
-from apo_bench.benchmark.report.trial_text import NUMBERS, predicted, verdict, why
+from apo_bench.benchmark.report.trial_text import NUMBERS, describe_failure, describe_prediction, describe_verdict
 from apo_bench.geometry import Array
 from apo_bench.io import group_by
 from apo_bench.records import Limits, knows_truth
-from apo_bench.records.run.replay_command import Files, without_seed
+from apo_bench.records.run.replay_command import Files, format_command_without_seed
 from apo_bench.records.run.trials import Trials
 
 _DECIMALS = {"extra_steps": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
 """Decimals of numbers; others have three."""
 _WORDS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-    "verdict": verdict,
-    "why": why,
+    "verdict": describe_verdict,
+    "why": describe_failure,
     "sentence": lambda row: row["sentence"] or "",
-    "failure_prediction": predicted,
+    "failure_prediction": describe_prediction,
 }
 """Text of a trial -> function of its record."""
 _NEEDED = (
@@ -69,7 +69,7 @@ class Matrix(NamedTuple):
     """Methods with their cells; None for a level that was not run."""
 
 
-def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mapping[Condition, int]) -> Matrix:
+def make_matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mapping[Condition, int]) -> Matrix:
     """Arrange the cells of a setting by method and noise level.
 
     Args:
@@ -102,10 +102,13 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
     for own in shown:
         columns["seed"] += own.values("seed")
         for name in NUMBERS:
-            columns[name] += _rounded(own.number(name), _DECIMALS.get(name, 3))
+            columns[name] += _round_value(own.number(name), _DECIMALS.get(name, 3))
         # trials of a condition differ in nothing but the seed, and the limit that a lost trial exceeded
         first = own.where(slice(1)).rows()[0]
-        commands = {lost: without_seed(first | {"failure_stage": lost}, files, limits) for lost in (None, "worker")}
+        commands = {
+            lost: format_command_without_seed(first | {"failure_stage": lost}, files, limits)
+            for lost in (None, "worker")
+        }
         for row in own.rows(_NEEDED):
             said = {name: say(row) for name, say in _WORDS.items()}
             said["command"] = commands["worker" if row["failure_stage"] == "worker" else None]
@@ -123,6 +126,6 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=6, mtime=0)).decode()
 
 
-def _rounded(numbers: Array, decimals: int) -> list[float | int | None]:
+def _round_value(numbers: Array, decimals: int) -> list[float | int | None]:
     """Round numbers, (n,), as they are shown, with None for NaN; the script adds trailing zeros."""
     return [None if math.isnan(x) else int(x) if x == int(x) else x for x in np.round(numbers, decimals).tolist()]

@@ -29,7 +29,7 @@ class Section(NamedTuple):
     """Whether the section is unfolded when the page opens."""
 
 
-def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:
+def render_page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:
     """Return a page as HTML in one piece; text that is not of type `Markup` is escaped.
 
     Args:
@@ -37,43 +37,43 @@ def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Sectio
         lead: Paragraphs below the answer.
         trials: The trials, as `pack_trials` packs them.
     """
-    script = _file("page.js")
+    script = _read_file("page.js")
     # the policy allows only the script with this hash
     known = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
         "base-uri 'none'; form-action 'none'"
     )
-    html = _template().render(
+    html = _load_template().render(
         title=title,
         answer=answer,
         lead=lead,
         sections=sections,
         trials=trials,
         script=Markup(script),
-        style=Markup(_file("page.css")),
+        style=Markup(_read_file("page.css")),
         policy=policy,
     )
     return str(html).lstrip()  # macros of the template leave empty lines
 
 
-def prose(text: str) -> Markup:
+def render_prose(text: str) -> Markup:
     """Convert `code` and *emphasis* to HTML as in Markdown; a `%` is kept on the line of its number."""
     code = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
     return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", code))
 
 
-def as_data(content: bytes, kind: str) -> str:
+def embed_data(content: bytes, kind: str) -> str:
     """Return bytes as a data URL."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _svg(text: str) -> str:
-    return as_data(text.encode(), "image/svg+xml")
+def _embed_svg(text: str) -> str:
+    return embed_data(text.encode(), "image/svg+xml")
 
 
 @cache
-def _template() -> Any:
+def _load_template() -> Any:
     """Load the template of a page, with its filters."""
     environment = Environment(
         loader=PackageLoader("apo_bench.benchmark.report.page"),
@@ -83,9 +83,9 @@ def _template() -> Any:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "prose": prose,
+        "prose": render_prose,
         "zip": zip,
-        "svg": _svg,
+        "svg": _embed_svg,
         "percent": format_percent,
         "percents": format_percent_interval,
     }
@@ -93,6 +93,6 @@ def _template() -> Any:
 
 
 @cache
-def _file(name: str) -> str:
+def _read_file(name: str) -> str:
     """Return the text of a style sheet or script in the folder of this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

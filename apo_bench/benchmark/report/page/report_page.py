@@ -8,14 +8,14 @@ import numpy as np
 from apo_bench.benchmark.analysis import ConditionResult, get_condition, group_by_setting, list_settings
 from apo_bench.benchmark.report.failure_choice import FailurePicture
 from apo_bench.benchmark.report.figures.sheet import Figure
-from apo_bench.benchmark.report.page.matrix import matrix, pack_trials
-from apo_bench.benchmark.report.page.page import Section, as_data, page
-from apo_bench.benchmark.report.run_facts import run_facts
+from apo_bench.benchmark.report.page.matrix import make_matrix, pack_trials
+from apo_bench.benchmark.report.page.page import Section, embed_data, render_page
+from apo_bench.benchmark.report.run_facts import list_run_facts
 from apo_bench.benchmark.report.tables.table import Table
-from apo_bench.benchmark.report.trial_text import why
+from apo_bench.benchmark.report.trial_text import describe_failure
 from apo_bench.io import format_count
-from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import limits_of, scenario_files
+from apo_bench.records.run.replay_command import format_replay_command
+from apo_bench.records.run.run_file import list_scenario_files, read_limits
 from apo_bench.records.run.trials import Trials
 
 _SUCCESS = (
@@ -55,77 +55,79 @@ class Contents(NamedTuple):
     """Paths of further files, relative to the page."""
 
 
-def report_page(c: Contents) -> str:
+def render_report(c: Contents) -> str:
     """Return the page as HTML."""
     numbers = {result.condition: i for i, result in enumerate(c.results)}
     # condition and seed of each picture
     shown = [(get_condition(picture.row), picture.row["seed"]) for picture in c.pictures]
     pictured = {f"{numbers[condition]}:{seed}": k for k, (condition, seed) in enumerate(shown) if condition in numbers}
     by_setting = group_by_setting(list_settings(c.results), c.results)
-    matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
+    matrices = [make_matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
     over = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations")
     half = ("folded", ("Noise level at half of the success", c.tables["half_levels"]))
     sections = [
         Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)], open=True),
-        Section("levels", "Success over noise level", [*_shown(c, over), ("text", _BANDS), half], open=True),
-        Section("pairs", "Paired differences", _shown(c, differences, "pairs")),
-        Section("stages", "Stages of failures", _shown(c, ("failure_stages",))),
-        Section("pictures", "Failures", _pictures(c)),
-        Section("gaps", "Gap before and after correction", _shown(c, ("gap_before_and_after",), "gaps")),
-        Section("prediction", "Prediction and physics", _shown(c, ("prediction",), "confusion")),
-        Section("probing", "Probing", _shown(c, (), "probing")),
-        Section("effort", "Effort", _shown(c, (), "effort")),
-        Section("calibration", "Calibration", _shown(c, (), "calibration")),
-        Section("detected", "Detected contacts", _shown(c, ("detected",), "detected")),
-        Section("timing", "Timing", _shown(c, ("timing",), "times", "work")),
-        Section("run", "Run", _run(c)),
+        Section(
+            "levels", "Success over noise level", [*_list_shown_figures(c, over), ("text", _BANDS), half], open=True
+        ),
+        Section("pairs", "Paired differences", _list_shown_figures(c, differences, "pairs")),
+        Section("stages", "Stages of failures", _list_shown_figures(c, ("failure_stages",))),
+        Section("pictures", "Failures", _make_picture_section(c)),
+        Section("gaps", "Gap before and after correction", _list_shown_figures(c, ("gap_before_and_after",), "gaps")),
+        Section("prediction", "Prediction and physics", _list_shown_figures(c, ("prediction",), "confusion")),
+        Section("probing", "Probing", _list_shown_figures(c, (), "probing")),
+        Section("effort", "Effort", _list_shown_figures(c, (), "effort")),
+        Section("calibration", "Calibration", _list_shown_figures(c, (), "calibration")),
+        Section("detected", "Detected contacts", _list_shown_figures(c, ("detected",), "detected")),
+        Section("timing", "Timing", _list_shown_figures(c, ("timing",), "times", "work")),
+        Section("run", "Run", _make_run_section(c)),
     ]
     title = c.name if "sweep" in c.name.lower() else f"Sweep {c.name}"
-    packed = pack_trials(c.trials, scenario_files(c.run), limits_of(c.run), pictured)
-    return page(title, c.answer, [_scope(c.trials)], sections, packed)
+    packed = pack_trials(c.trials, list_scenario_files(c.run), read_limits(c.run), pictured)
+    return render_page(title, c.answer, [_describe_scope(c.trials)], sections, packed)
 
 
-def _shown(c: Contents, figures: Sequence[str], *tables: str) -> list[tuple[str, Any]]:
+def _list_shown_figures(c: Contents, figures: Sequence[str], *tables: str) -> list[tuple[str, Any]]:
     """Return the blocks of a section: existing figures, then tables."""
     drawn = [("figure", c.figures[name]) for name in figures if name in c.figures]
     return [*drawn, *(("table", c.tables[name]) for name in tables)]
 
 
-def _pictures(c: Contents) -> list[tuple[str, Any]]:
+def _make_picture_section(c: Contents) -> list[tuple[str, Any]]:
     """Return the blocks of the section on failures: pictures, and why others are missing."""
     missing = "; ".join(c.no_pictures) or "None was asked for, or no trial that was carried out failed."
     if not c.pictures:
         return [("missing", f"No picture: {missing}")]
-    blocks: list[tuple[str, Any]] = [("picture", _picture(c, k)) for k in range(len(c.pictures))]
+    blocks: list[tuple[str, Any]] = [("picture", _make_picture(c, k)) for k in range(len(c.pictures))]
     return [*blocks, *[("missing", f"Not drawn: {missing}")] * bool(c.no_pictures)]
 
 
-def _picture(c: Contents, number: int) -> dict[str, str]:
+def _make_picture(c: Contents, number: int) -> dict[str, str]:
     """Return title, description, command and image of a picture for the template."""
     row, jpeg, words = c.pictures[number]
     condition = get_condition(row)
     where = "" if condition is None else f"{condition.title}, noise {condition.noise_mm:g}, "
     return {
         "name": f"picture-{number}",
-        "title": f"{row['method']}: {why(row)}.",
+        "title": f"{row['method']}: {describe_failure(row)}.",
         "words": f"{where}seed {row['seed']}: {row.get('sentence') or 'it failed'}. ({words})",
-        "command": replay_command(row, scenario_files(c.run), limits_of(c.run)),
-        "source": as_data(jpeg, "image/jpeg"),
+        "command": format_replay_command(row, list_scenario_files(c.run), read_limits(c.run)),
+        "source": embed_data(jpeg, "image/jpeg"),
     }
 
 
-def _run(c: Contents) -> list[tuple[str, Any]]:
+def _make_run_section(c: Contents) -> list[tuple[str, Any]]:
     """Return the blocks of the section on the run: command, tables of settings, and links to further files."""
     hosts = {line["host"] for line in c.tables["work"].items}
     command = [("command", c.run["command"])] if "command" in c.run else []
     none = "There is no run.json beside the rows, so versions and command are not known."
     blocks: list[tuple[str, Any]] = [("text", _RUN), *command, *[("missing", none)] * (not c.run)]
-    facts = run_facts(c.run, c.trials, hosts)
+    facts = list_run_facts(c.run, c.trials, hosts)
     return [*blocks, *(("folded", fact) for fact in facts.items()), ("links", c.beside)]
 
 
-def _scope(trials: Trials) -> str:
+def _describe_scope(trials: Trials) -> str:
     """Return a sentence that counts trials, scenarios, methods and seeds, and the trials that were left out."""
     names = ("scenario", "clearance_mm", "seed", "human_error_scale")
     tried = len(trials.groups(names).keys)

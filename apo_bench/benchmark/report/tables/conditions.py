@@ -3,7 +3,13 @@
 from collections.abc import Sequence
 
 from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, PairedComparison
-from apo_bench.benchmark.report.tables.table import Table, TableColumn, condition_columns, endings, interval_columns
+from apo_bench.benchmark.report.tables.table import (
+    Table,
+    TableColumn,
+    format_endings,
+    list_condition_columns,
+    list_interval_columns,
+)
 from apo_bench.records import TrialConfig
 
 _AXES = (
@@ -18,7 +24,7 @@ _AXES = (
 """Settings whose column people see only if some condition differs from the default."""
 
 
-def condition_table(cells: Sequence[ConditionResult]) -> Table:
+def make_condition_table(cells: Sequence[ConditionResult]) -> Table:
     """Return the table of success rates, one line per condition."""
     unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
     min_predicted_success = "min_predicted_success" in unusual
@@ -48,10 +54,10 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
             TableColumn("trials", "n"),
             TableColumn("successes"),
             TableColumn("rate"),
-            *interval_columns(),
+            *list_interval_columns(),
             TableColumn("executed", value="executed.trials"),
             TableColumn("executed_rate", value="executed.rate"),
-            *interval_columns("executed.interval", "executed_low_95", "executed_high_95"),
+            *list_interval_columns("executed.interval", "executed_low_95", "executed_high_95"),
             TableColumn("abstained", "abstained" * min_predicted_success),
             TableColumn(
                 "wrong_when_executed",
@@ -65,22 +71,22 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
             TableColumn("loose_successes"),
             TableColumn("loose_rate", "loose", text="{loose_rate:percent}"),
             TableColumn("excluded"),
-            TableColumn("failures", "failures", _all_endings, "{failures:endings}", words=True),
+            TableColumn("failures", "failures", _describe_all_endings, "{failures:endings}", words=True),
         ),
     )
 
 
-def _all_endings(cell: ConditionResult) -> str:
+def _describe_all_endings(cell: ConditionResult) -> str:
     """Format all endings of a condition, for files."""
-    return endings(cell.failures, most=None)
+    return format_endings(cell.failures, most=None)
 
 
-def pair_table(pairs: Sequence[PairedComparison]) -> Table:
+def make_pair_table(pairs: Sequence[PairedComparison]) -> Table:
     """Return the table of paired comparisons, one line per condition and reference."""
     return Table(
         pairs,
         (
-            *condition_columns(),
+            *list_condition_columns(),
             TableColumn("reference", "against", words=True),
             TableColumn("pairs", "pairs"),
             TableColumn("only_method"),
@@ -92,7 +98,7 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
                 "{both}, {only_method}, {only_reference}, {neither}",
             ),
             TableColumn("difference", "difference [points]", text="{difference:points} ({interval:points})"),
-            *interval_columns(),
+            *list_interval_columns(),
             TableColumn("p_mcnemar", "p (adjusted)", "p", "{p:p} ({p_adjusted:p})"),
             TableColumn("p_adjusted"),
             TableColumn("reference_failed", value="recovered.trials"),
@@ -103,7 +109,7 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
                 "{recovered.successes} of {recovered.trials} ({recovered.interval:percents})",
             ),
             TableColumn("recovery_rate", value="recovered.rate"),
-            *interval_columns("recovered.interval", "recovery_low_95", "recovery_high_95"),
+            *list_interval_columns("recovered.interval", "recovery_low_95", "recovery_high_95"),
             TableColumn("reference_right", value="harmed.trials"),
             TableColumn(
                 "harmed",
@@ -112,7 +118,7 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
                 "{harmed.successes} of {harmed.trials} ({harmed.interval:percents})",
             ),
             TableColumn("harm_rate", value="harmed.rate"),
-            *interval_columns("harmed.interval", "harm_low_95", "harm_high_95"),
+            *list_interval_columns("harmed.interval", "harm_low_95", "harm_high_95"),
             TableColumn("planned"),
             TableColumn(
                 "free_difference_mm",
@@ -120,7 +126,7 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
                 "free_mm",
                 "{free_mm:signed} ({free_interval.low:signed} to {free_interval.high:signed}), n {planned}",
             ),
-            *interval_columns("free_interval", "free_low_95_mm", "free_high_95_mm"),
+            *list_interval_columns("free_interval", "free_low_95_mm", "free_high_95_mm"),
         ),
         "No method shares a condition with `uncorrected` or `paper`, with which methods are paired.",
         (
@@ -134,12 +140,12 @@ def pair_table(pairs: Sequence[PairedComparison]) -> Table:
     )
 
 
-def half_table(levels: Sequence[HalfLevel]) -> Table:
+def make_half_level_table(levels: Sequence[HalfLevel]) -> Table:
     """Return the table of half levels, one line per method and setting; in files an estimate outside is empty."""
     return Table(
         levels,
         (
-            *condition_columns(levels=False),
+            *list_condition_columns(levels=False),
             TableColumn("smallest_level", value="smallest"),
             TableColumn("largest_level", value="largest"),
             TableColumn("trials", "n"),

@@ -4,23 +4,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from apo_bench.benchmark.analysis import Line, format_percent
-from apo_bench.benchmark.report.tables.table import Table, TableColumn, condition_columns, interval_columns
+from apo_bench.benchmark.report.tables.table import Table, TableColumn, list_condition_columns, list_interval_columns
 
 
-def _words(*names: str) -> tuple[TableColumn, ...]:
+def _list_words(*names: str) -> tuple[TableColumn, ...]:
     """Return text columns with the names of settings."""
     return tuple(TableColumn(name, name, words=True) for name in names)
 
 
-_METHOD = _words("scenario", "method")
+_METHOD = _list_words("scenario", "method")
 
 
-def gap_table(lines: Sequence[Line]) -> Table:
+def make_gap_table(lines: Sequence[Line]) -> Table:
     """Return the table of contact gaps, one line per condition."""
     return Table(
         lines,
         (
-            *condition_columns(),
+            *list_condition_columns(),
             TableColumn("trials", "n"),
             TableColumn("observed_5"),
             TableColumn("observed_median_mm", "observed [mm]", text="{observed_median_mm:.3f}"),
@@ -38,13 +38,13 @@ def gap_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def probing_table(lines: Sequence[Line]) -> Table:
+def make_probing_table(lines: Sequence[Line]) -> Table:
     """Return the table of a probing robot's base error, one line per condition."""
     heads = {"drawn": "drawn with", "assumed": "assumed", "estimated": "estimated", "std": "stated std"}
     return Table(
         lines,
         (
-            *condition_columns(),
+            *list_condition_columns(),
             TableColumn("trials", "n"),
             TableColumn("probe_contacts", "probe contacts", text="{probe_contacts:.1f}"),
             TableColumn("rejected", "rejected"),
@@ -64,7 +64,7 @@ def probing_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def effort_table(lines: Sequence[Line]) -> Table:
+def make_effort_table(lines: Sequence[Line]) -> Table:
     """Return the table of extra steps and simulated time, one line per scenario and method."""
     return Table(
         lines,
@@ -83,7 +83,7 @@ def effort_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def time_table(lines: Sequence[Line]) -> Table:
+def make_time_table(lines: Sequence[Line]) -> Table:
     """Return the table of wall times, one line per scenario and method."""
     return Table(
         lines,
@@ -100,12 +100,12 @@ def time_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def work_table(lines: Sequence[Line]) -> Table:
+def make_work_table(lines: Sequence[Line]) -> Table:
     """Return the table of wall times of workers, one line per worker."""
     return Table(
         lines,
         (
-            *_words("host", "worker"),
+            *_list_words("host", "worker"),
             TableColumn("trials", "rows"),
             TableColumn("busy_s", "busy [s]", text="{busy_s:.0f}"),
             TableColumn("rows_per_minute", "rows per minute", text="{rows_per_minute:.1f}"),
@@ -113,13 +113,13 @@ def work_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def calibration_table(lines: Sequence[Line]) -> Table:
+def make_calibration_table(lines: Sequence[Line]) -> Table:
     """Return the table of stated uncertainty against the truth; one line per scenario, noise, contacts and method."""
     share = "{{{0}.rate:percent}} of {{{0}.trials}}".format
     return Table(
         lines,
         (
-            *_words("scenario", "noise", "contact_source", "method"),
+            *_list_words("scenario", "noise", "contact_source", "method"),
             TableColumn("planned", "n"),
             TableColumn("covered", "covered", text=share("covered")),
             TableColumn("fixed_mm", "fixed error [mm]", text="{fixed_mm:.3f}"),
@@ -140,7 +140,7 @@ def calibration_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def confusion_table(lines: Sequence[Line]) -> Table:
+def make_confusion_table(lines: Sequence[Line]) -> Table:
     """Return the table of predictions against outcomes, one line per scenario and method, and one over all."""
     return Table(
         lines,
@@ -165,19 +165,19 @@ def confusion_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def detection_table(lines: Sequence[Line]) -> Table:
+def make_detection_table(lines: Sequence[Line]) -> Table:
     """Return the table of detected contacts, one line per scenario, noise, pose and contact source, and noise level."""
     return Table(
         lines,
         (
-            *_words("scenario", "noise", "pose_source", "contact_source", "human_error_scale"),
+            *_list_words("scenario", "noise", "pose_source", "contact_source", "human_error_scale"),
             TableColumn("noise_mm", "noise [mm]", words=True),
             TableColumn("noise_deg", "noise [deg]", words=True),
             TableColumn("demonstrations"),
             TableColumn("complete", "all right", "complete.successes", "{complete.successes} of {demonstrations}"),
             TableColumn("rate", "rate", "complete.rate", "{complete.rate:percent}"),
             TableColumn("", "95 % interval", "complete.interval", "{complete.interval:percents}"),
-            *interval_columns("complete.interval"),
+            *list_interval_columns("complete.interval"),
             TableColumn("right"),
             TableColumn("missed", "missed"),
             TableColumn("false", "false"),
@@ -192,7 +192,7 @@ def detection_table(lines: Sequence[Line]) -> Table:
     )
 
 
-def prediction_summary(line: Line) -> str:
+def summarise_predictions(line: Line) -> str:
     """Summarise a line of predictions: `Predicted: 129 of 134 executed trials ended as predicted (96.3 %, ...`."""
     executed: Any = line["executed"]
     if not executed:

@@ -15,16 +15,16 @@ DASH = "–"
 """Text in place of an unknown value."""
 
 
-def _p_value(p: float) -> str:
+def _format_p_value(p: float) -> str:
     return f"{p:.3f}" if p >= 0.001 else "< 0.001"
 
 
-def endings(failures: Mapping[str, int], most: int | None = 3) -> str:
+def format_endings(failures: Mapping[str, int], most: int | None = 3) -> str:
     """Format failures: `attach: force_stop 12, judge: gap 3`, at most `most` of them, the most frequent first."""
     return ", ".join(f"{why} {count}" for why, count in list(failures.items())[:most])
 
 
-def _hundredths(share: float) -> str:
+def _format_percent_number(share: float) -> str:
     return f"{100 * share:.2f}"
 
 
@@ -32,11 +32,11 @@ _SPELLED: Mapping[str, Callable[[Any], str]] = {
     "percent": format_percent,
     "percent2": partial(format_percent, digits=2),
     "percents": format_percent_interval,
-    "hundredths": _hundredths,
+    "hundredths": _format_percent_number,
     "points": format_points,
     "signed": partial(format_signed, digits=3),
-    "p": _p_value,
-    "endings": endings,
+    "p": _format_p_value,
+    "endings": format_endings,
 }
 """Format specification of a template -> function, in addition to the formats of Python."""
 
@@ -60,7 +60,7 @@ class _Template(Formatter):
 _TEMPLATE = _Template()
 
 
-def fill(template: str) -> Callable[[Any], str | None]:
+def make_template(template: str) -> Callable[[Any], str | None]:
     """Return a function that fills a template from an item, or returns None if any value in it is None."""
 
     def say(item: Any) -> str | None:
@@ -100,7 +100,7 @@ class TableColumn(NamedTuple):
 
     def said(self, item: Any) -> str:
         """Return the text of an item for people."""
-        value = fill(self.text)(item) if self.text else self.of(item)
+        value = make_template(self.text)(item) if self.text else self.of(item)
         if value is None:
             return DASH
         return f"{value:g}" if isinstance(value, float) else str(value)
@@ -160,11 +160,13 @@ def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]
     if not has_parquet():
         return [path]
     beside = path.with_suffix(".parquet")
-    write_columns(list(map(_text, columns)), [list(map(_text, column)) for column in columns.values()], beside)
+    write_columns(
+        list(map(_format_cell, columns)), [list(map(_format_cell, column)) for column in columns.values()], beside
+    )
     return [path, beside]
 
 
-def condition_columns(path: str = "condition", levels: bool = True) -> tuple[TableColumn, ...]:
+def list_condition_columns(path: str = "condition", levels: bool = True) -> tuple[TableColumn, ...]:
     """Return the columns that identify a condition: few for people, one per setting for files.
 
     Args:
@@ -198,11 +200,13 @@ def condition_columns(path: str = "condition", levels: bool = True) -> tuple[Tab
     )
 
 
-def interval_columns(path: str = "interval", low: str = "low_95", high: str = "high_95") -> tuple[TableColumn, ...]:
+def list_interval_columns(
+    path: str = "interval", low: str = "low_95", high: str = "high_95"
+) -> tuple[TableColumn, ...]:
     """Return the columns of both ends of an interval, for files."""
     return TableColumn(low, value=f"{path}.low"), TableColumn(high, value=f"{path}.high")
 
 
-def _text(x: Any) -> Any:
+def _format_cell(x: Any) -> Any:
     """Replace half letters, as names of folders may have, since UTF-8 has none; other values stay."""
     return x.encode("utf-8", "replace").decode() if isinstance(x, str) else x

@@ -52,13 +52,13 @@ def find_facets(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
         fewest: Smallest number of facets around a full turn of a round face.
     """
     widest = max(SMOOTH_RAD, widest_of(fewest))
-    normals = _normals(mesh)
+    normals = _list_normals(mesh)
     i, k = mesh.neighbours.T
     # Small angles from |n_i x n_k|, as rounding makes arccos (n_i . n_k) coarse near 1.
     angle = np.arccos(np.clip((normals[i] * normals[k]).sum(axis=1), -1.0, 1.0))
     angle = np.where(angle < 0.1, np.linalg.norm(np.cross(normals[i], normals[k]), axis=1), angle)
     # Two triangles are in one facet if they face the same way, or nearly so and their corners lie in both planes.
-    off = np.maximum(_height(mesh, normals, i, k), _height(mesh, normals, k, i))
+    off = np.maximum(_measure_corner_heights(mesh, normals, i, k), _measure_corner_heights(mesh, normals, k, i))
     flat = (angle < _SAME_RAD) | ((angle < _NEAR_RAD) & (off < FLAT * mesh.extent))
     count, of = find_connected_groups(mesh.neighbours[flat], len(mesh.triangles))
     # Sums over the triangles of a facet: of their area vectors, and of their centres weighted by area.
@@ -88,13 +88,13 @@ def find_facets(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     )
 
 
-def _height(mesh: Mesh, normals: Array, i: Any, k: Any) -> Array:
+def _measure_corner_heights(mesh: Mesh, normals: Array, i: Any, k: Any) -> Array:
     """Return the largest distance of the corners of triangles k from the planes of triangles i, (len(i),), [mm]."""
     points = mesh.corners[mesh.triangles[k]] - mesh.corners[mesh.triangles[i, 0]][:, None]
     return np.asarray(np.abs((points * normals[i][:, None]).sum(axis=2)).max(axis=1))
 
 
-def edges_of(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
+def list_edges(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
     """Return every edge twice, once for each of its triangles.
 
     Returns:
@@ -109,11 +109,11 @@ def edges_of(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
     return own, other, length, longest
 
 
-def _normals(mesh: Mesh) -> Array:
+def _list_normals(mesh: Mesh) -> Array:
     """Return the unit normal of each triangle, (t, 3); of a needle that of its neighbour across the longest edge."""
     size = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(size, 1e-300)[:, None]
-    own, other, length, longest = edges_of(mesh)
+    own, other, length, longest = list_edges(mesh)
     # Hardly any height over the longest edge, so its own normal is mere rounding.
     needle = size < FLAT * mesh.extent * longest
     # Entries where a needle has a sound neighbour across its longest edge.

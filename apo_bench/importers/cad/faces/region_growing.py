@@ -9,10 +9,10 @@ from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
 from apo_bench.importers.cad.faces.surface_fitting import (
     ON_WALL,
-    Round,
-    axis_of,
-    circle_through,
-    facets_on,
+    RoundSurface,
+    find_facets_on,
+    fit_axis,
+    fit_circle,
     refine_round,
 )
 from apo_bench.importers.cad.solids import Mesh, find_connected_groups
@@ -32,7 +32,7 @@ _SAME_BEND = 0.15
 class FoundWall(NamedTuple):
     """A cylinder or cone and the facets on it."""
 
-    surface: Round
+    surface: RoundSurface
     members: Any  # the facets, ascending
     hole: bool
     spans: Array  # angle that each facet spans about the axis, (len(members),), [rad]
@@ -47,15 +47,15 @@ def find_walls(mesh: Mesh, facets: Facets) -> list[FoundWall]:
     """Return the cylinders and cones of each smooth group of facets, fitted to all of it or grown from edges."""
     walls: list[FoundWall] = []
     work = _MOST_WORK
-    for group in smooth_groups(facets, np.unique(facets.smooth)):
+    for group in group_by_smooth_edges(facets, np.unique(facets.smooth)):
         if len(group) < _FEWEST:
             continue
         inside = np.isin(facets.smooth[:, 0], group)
         # Most smooth groups are one wall, such as a hole: then a single fit to the whole group suffices.
         points = mesh.corners[np.unique(facets.along[inside])]
-        axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
-        starts = ((refine_round(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
-        whole = _grow(mesh, facets, group, inside, starts)
+        axes = ((fit_axis(facets.normals[group], cone), cone) for cone in (False, True))
+        starts = ((refine_round(fit_circle(points, axis), points, cone), cone) for axis, cone in axes)
+        whole = _grow_surface(mesh, facets, group, inside, starts)
         work -= 2 * len(group)
         if whole is not None and len(whole.members) == len(group):
             walls.append(whole)
@@ -81,11 +81,11 @@ def _merge_walls(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: lis
         rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
         if len(rest.members) < _FEWEST:
             continue
-        near, _, _ = facets_on(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
+        near, _, _ = find_facets_on(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
         if len(near) > len(rest.members):
             untaken = inside & np.isin(facets.smooth, left).all(axis=1)
             start = (wall.surface, wall.surface.slope != 0.0)
-            more = _grow(mesh, facets, left, untaken, [start], int(rest.members[0]))
+            more = _grow_surface(mesh, facets, left, untaken, [start], int(rest.members[0]))
             rest = more if more is not None and len(more.members) > len(rest.members) else rest
         walls.append(rest)
         left = np.setdiff1d(left, rest.members)
@@ -122,12 +122,15 @@ def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: 
         # Try a cylinder first, as a cone fits every cylinder too. A start that does not even hold its own facets is not
         # worth a fit.
         for cone in (False, True):
-            start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, edges_around, taken)
-            if start is None or len(facets_on(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
+            start, near = (_start_cone if cone else _start_cylinder)(mesh, facets, row, edges_around, taken)
+            if (
+                start is None
+                or len(find_facets_on(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST
+            ):
                 continue
             left = group[~taken[group]]
             untaken = inside & ~taken[facets.smooth].any(axis=1)
-            wall = _grow(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
+            wall = _grow_surface(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
             work -= 4 * len(left)
             if wall is not None:
                 failed = 0
@@ -137,9 +140,9 @@ def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: 
     return walls, work
 
 
-def _seed_cylinder(
+def _start_cylinder(
     mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
-) -> tuple[Round | None, Any]:
+) -> tuple[RoundSurface | None, Any]:
     """Return a start for a cylinder from edge `row`, and the facets around that edge.
 
     The axis is the edge, the circle goes through the ends of parallel edges nearby. None if there are too few.
@@ -160,16 +163,16 @@ def _seed_cylinder(
     along = ends[:, 1] - ends[:, 0]
     straight = np.linalg.norm(np.cross(along, axis), axis=1) < 0.02 * np.linalg.norm(along, axis=1)
     are_enough = length >= 1e-9 * mesh.extent and straight.sum() >= 2
-    return circle_through(ends[straight].reshape(-1, 3), axis) if are_enough else None, near
+    return fit_circle(ends[straight].reshape(-1, 3), axis) if are_enough else None, near
 
 
-def _seed_cone(
+def _start_cone(
     mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
-) -> tuple[Round | None, Any]:
+) -> tuple[RoundSurface | None, Any]:
     """Return a start for a cone from edge `row`, and the facets it was fitted to; None if there are too few.
 
     Args:
-        row, edges_around, taken: As in `_seed_cylinder`.
+        row, edges_around, taken: As in `_start_cylinder`.
     """
     # Facets of one cone meet at equal angles: collect them outwards from the first facet over edges of that angle.
     angle = facets.angle[row]
@@ -187,15 +190,15 @@ def _seed_cone(
     if len(members) < 5:
         return None, near
     points = mesh.corners[np.unique(facets.along[sorted(rows)])]
-    return refine_round(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
+    return refine_round(fit_circle(points, fit_axis(facets.normals[near], True)), points, True), near
 
 
-def _grow(
+def _grow_surface(
     mesh: Mesh,
     facets: Facets,
     among: Any,
     inside: Any,
-    starts: Iterable[tuple[Round | None, bool]],
+    starts: Iterable[tuple[RoundSurface | None, bool]],
     seed: int | None = None,
 ) -> FoundWall | None:
     """Alternate between finding the facets on a surface and refitting the surface, until both are stable.
@@ -217,7 +220,7 @@ def _grow(
         for _ in range(8):
             if surface is None or not surface.radius < 50.0 * mesh.extent:
                 break
-            members, hole, spans = facets_on(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
+            members, hole, spans = find_facets_on(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
             if seed is not None:
                 is_connected = _is_connected(facets.smooth[inside], members, seed)
                 members, spans = members[is_connected], spans[is_connected]
@@ -242,19 +245,19 @@ def _is_connected(smooth: Any, members: Any, seed: int) -> Any:
     """Return which members, ascending, are connected with a seed by smooth edges; none if the seed is no member."""
     if seed not in members:
         return np.zeros(len(members), dtype=bool)
-    _, group = _smoothly_connected(smooth, members)
+    _, group = _label_smooth_groups(smooth, members)
     return group == group[np.searchsorted(members, seed)]
 
 
-def smooth_groups(facets: Facets, members: Any) -> list[Any]:
+def group_by_smooth_edges(facets: Facets, members: Any) -> list[Any]:
     """Return the groups of `members`, ascending, that are connected by smooth edges between members."""
     if not len(members):
         return []
-    count, group = _smoothly_connected(facets.smooth, members)
+    count, group = _label_smooth_groups(facets.smooth, members)
     order = np.argsort(group, kind="stable")
     return np.split(members[order], np.cumsum(np.bincount(group, minlength=count))[:-1])
 
 
-def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
+def _label_smooth_groups(smooth: Any, members: Any) -> tuple[int, Any]:
     """Return the number of groups that smooth edges between members make, and the group of each member."""
     return find_connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

@@ -6,8 +6,8 @@ import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
-from apo_bench.importers.cad.faces.region_growing import FoundWall, find_walls, smooth_groups
-from apo_bench.importers.cad.faces.surface_fitting import fit_plane, round_region
+from apo_bench.importers.cad.faces.region_growing import FoundWall, find_walls, group_by_smooth_edges
+from apo_bench.importers.cad.faces.surface_fitting import fit_plane, make_round_region
 from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
 _LARGER = 8.0
@@ -18,7 +18,7 @@ _GAP = 1.8
 """A wall goes all the way round if no gap is wider than this many facets."""
 
 
-class _End(NamedTuple):
+class _SmoothEnd(NamedTuple):
     """The smooth transition at one end of a round surface to what lies beyond."""
 
     beyond: frozenset[int]
@@ -47,19 +47,19 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     walls = [wall for wall in every if wall.sides >= fewest]
     triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
     regions = [
-        round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall), wall.sides)
+        make_round_region(mesh, mine, wall.surface, wall.hole, _measure_covered_angle(facets, wall), wall.sides)
         for wall, mine in zip(walls, triangles, strict=True)
     ]
-    left = _wall_of_pieces(facets, walls) < 0  # facets on no wall
+    left = _assign_walls(facets, walls) < 0  # facets on no wall
     thin = facets.areas < (FLAT * mesh.extent) ** 2  # slivers
-    free = _find_free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
+    free = _find_free_form_facets(facets, left) & (_assign_walls(facets, every) < 0) | (thin & left)
     regions += [fit_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
-    groups = smooth_groups(facets, np.flatnonzero(free))
+    groups = group_by_smooth_edges(facets, np.flatnonzero(free))
     regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
     return tuple(sorted(regions, key=lambda region: int(region.triangles[0])))
 
 
-def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
+def _assign_walls(facets: Facets, walls: list[FoundWall]) -> Any:
     """Return the index of the wall of each facet, (f,); -1 for none."""
     of = np.full(len(facets.areas), -1)
     for k, wall in enumerate(walls):
@@ -67,7 +67,7 @@ def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
     return of
 
 
-def _find_free(facets: Facets, left: Any) -> Any:
+def _find_free_form_facets(facets: Facets, left: Any) -> Any:
     """Return which facets belong to free-form surfaces, (f,): those with smooth edges that are not far larger.
 
     Args:
@@ -89,18 +89,18 @@ def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[Foun
 
     The mesh approximates such a surface by bands, each of which continues smoothly in the next at both ends.
     """
-    of = _wall_of_pieces(facets, walls)
+    of = _assign_walls(facets, walls)
     bands: set[int] = set()
-    ends: list[list[_End]] = []
+    ends: list[list[_SmoothEnd]] = []
     widths: list[float] = []
     for k, wall in enumerate(walls):
         corners = mesh.corners[np.unique(facets.corner[np.isin(facets.owner, wall.members)])]
         height, distance, _ = wall.surface.polar(corners)
         width = float(np.ptp(height)) * float(np.hypot(1.0, wall.surface.slope))
-        mine = _ends(mesh, facets, of, k, wall, float(height.min() + height.max()) / 2.0)
+        mine = _find_smooth_ends(mesh, facets, of, k, wall, float(height.min() + height.max()) / 2.0)
         # A fillet of a curved edge is narrower than its arc is long, and smooth at one end at least. A band between two
         # others bends by the same angle at both ends.
-        turn = _turn(facets, wall)
+        turn = _measure_covered_angle(facets, wall)
         is_short = turn < WHOLE_TURN and bool(mine) and width < turn * float(distance.mean())
         if is_short or (len(mine) == 2 and all(end.is_like(mine[0].angle, width) for end in mine)):
             bands.add(k)
@@ -116,7 +116,7 @@ def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[Foun
     return [wall for k, wall in enumerate(walls) if k not in bands]
 
 
-def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: float) -> list[_End]:
+def _find_smooth_ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: float) -> list[_SmoothEnd]:
     """Return the ends of round surface k that continue smoothly, at most two.
 
     Args:
@@ -137,13 +137,15 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: 
     width = 2.0 * np.linalg.norm(facets.centers[beyond] - at, axis=1)
     low = wall.surface.polar(at)[0] < middle
     return [
-        _End(frozenset(of[beyond[side]].tolist()), float(np.median(facets.angle[rows[side]])), np.median(width[side]))
+        _SmoothEnd(
+            frozenset(of[beyond[side]].tolist()), float(np.median(facets.angle[rows[side]])), np.median(width[side])
+        )
         for side in (low, ~low)
         if side.any()
     ]
 
 
-def _turn(facets: Facets, wall: FoundWall) -> float:
+def _measure_covered_angle(facets: Facets, wall: FoundWall) -> float:
     """Return the angle that the facets of a round face cover about its axis, [rad]."""
     x, y = find_square_axes(wall.surface.axis)
     _, _, out = wall.surface.polar(facets.centers[wall.members])

@@ -22,7 +22,7 @@ _SNAP_RAD = 2e-6  # an axis or normal nearer to an axis of the frame is set to i
 _FULL_RAD = 1e-6  # a wall with no wider gap goes all the way round
 
 
-class Round(NamedTuple):
+class RoundSurface(NamedTuple):
     """An infinite cylinder or cone."""
 
     point: Array  # a point on the axis
@@ -50,7 +50,7 @@ class Round(NamedTuple):
         return (out - self.slope * self.axis) / np.hypot(1.0, self.slope)
 
 
-def circle_through(points: Array, axis: Array) -> Round | None:
+def fit_circle(points: Array, axis: Array) -> RoundSurface | None:
     """Return the cylinder along a given axis through points, by least squares; None if the points fix no circle."""
     x, y = find_square_axes(axis)
     middle = points.mean(axis=0)
@@ -66,10 +66,10 @@ def circle_through(points: Array, axis: Array) -> Round | None:
         return None
     a, b = solution[:2] / 2.0
     radius = float(np.sqrt(max(solution[2] + a * a + b * b, 0.0)))
-    return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
+    return RoundSurface(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
 
-def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None:
+def refine_round(start: RoundSurface | None, points: Array, cone: bool) -> RoundSurface | None:
     """Return the cylinder or cone nearest to points: Levenberg-Marquardt on distances from the wall.
 
     Args:
@@ -95,14 +95,14 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
             return None
         slope, radius = np.polyfit(height - (middle - start.point) @ start.axis, distance, 1)
 
-    def moved(p: Array) -> Round:
+    def moved(p: Array) -> RoundSurface:
         """Return the surface with parameters p: two tilts of the axis, two shifts across it, radius, slope of a cone.
 
         Shifts and radius are shares of the size of the points.
         """
         axis = start.axis + p[0] * x + p[1] * y
         axis = axis / np.linalg.norm(axis)
-        return Round(at + size * (p[2] * x + p[3] * y), axis, size * p[4], p[5] if cone else 0.0)
+        return RoundSurface(at + size * (p[2] * x + p[3] * y), axis, size * p[4], p[5] if cone else 0.0)
 
     def off(p: Array) -> Array:
         return np.asarray(moved(p).off(points) / size)
@@ -115,7 +115,9 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 
 
-def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
+def find_facets_on(
+    mesh: Mesh, facets: Facets, among: Any, wall: RoundSurface, tolerance: float
+) -> tuple[Any, bool, Array]:
     """Find the facets on a round surface.
 
     Args:
@@ -157,7 +159,7 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
     return among[good], hole, span[good]
 
 
-def axis_of(normals: Array, cone: bool) -> Array:
+def fit_axis(normals: Array, cone: bool) -> Array:
     """Return the axis of a round face from facet normals, (3,): the direction in which the normals differ least.
 
     Normals of a cylinder are square to its axis, those of a cone at a constant angle, hence without their mean.
@@ -170,19 +172,21 @@ def axis_of(normals: Array, cone: bool) -> Array:
 def fit_plane(mesh: Mesh, triangles: Any) -> Region:
     """Return the region of coplanar triangles, with the plane nearest to them."""
     n = mesh.across[triangles].sum(axis=0)
-    n = _snap(n / np.linalg.norm(n))
+    n = _snap_to_axis(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
     weight = np.linalg.norm(mesh.across[triangles], axis=1)
-    return plane_region(triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
+    return make_plane_region(triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
 
 
-def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
+def make_plane_region(triangles: Any, normal: Array, point: Array) -> Region:
     """Return the region of triangles on the plane through a point."""
-    n = _snap(normal / np.linalg.norm(normal))
+    n = _snap_to_axis(normal / np.linalg.norm(normal))
     return Region("plane", triangles, direction=n, point=float(point @ n) * n)
 
 
-def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
+def make_round_region(
+    mesh: Mesh, triangles: Any, surface: RoundSurface, hole: bool, turn: float, sides: int = 0
+) -> Region:
     """Return the region of triangles on a cylinder or a cone, with its two ends.
 
     Args:
@@ -195,7 +199,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     # so that a file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
     slope = surface.slope * float(np.sign(axis @ surface.axis))
-    axis = _snap(axis)
+    axis = _snap_to_axis(axis)
     point = surface.point - surface.point @ axis * axis
     foot = float(surface.point @ axis)  # height of the surface's own point over the new one
     every = np.unique(mesh.triangles[triangles])
@@ -206,7 +210,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     if slope:
         radii = [0.0 if r < ON_WALL * mesh.extent else r for r in radii]  # snaps the tip of a cone to radius 0
     # Distance of each border corner from the nearer end; if both ends are level circles, it is 0 for all of them.
-    ends = np.minimum(height - low, high - height)[np.isin(every, border_of(mesh, triangles))]
+    ends = np.minimum(height - low, high - height)[np.isin(every, list_border_corners(mesh, triangles))]
     off = (distance - radii[0] - slope * (height - low)) / np.hypot(1.0, slope)
     on = off > -ON_WALL * mesh.extent
     return Region(
@@ -223,7 +227,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     )
 
 
-def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
+def measure_wall_turn(mesh: Mesh, triangles: Any, wall: RoundSurface) -> float:
     """Return the angle about the axis that the triangles of a wall cover, [rad]."""
     x, y = find_square_axes(wall.axis)
     _, distance, out = wall.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
@@ -243,14 +247,14 @@ def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
     return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
 
 
-def _snap(n: Array) -> Array:
+def _snap_to_axis(n: Array) -> Array:
     """Return the direction, set to an axis of the frame if it differs only by rounding."""
     axis = int(np.abs(n).argmax())
     exact = np.sign(n[axis]) * np.eye(3)[axis]
     return exact if np.linalg.norm(n - exact) < _SNAP_RAD else n
 
 
-def border_of(mesh: Mesh, triangles: Any) -> Any:
+def list_border_corners(mesh: Mesh, triangles: Any) -> Any:
     """Return the corners on the border of a region, ascending."""
     inside = np.zeros(len(mesh.triangles), dtype=bool)
     inside[triangles] = True

@@ -34,19 +34,19 @@ _FEWER = 0.9
 INSIDE_OUT = "it was inside out, and was turned"  # text of a repair
 
 
-def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
+def split_into_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     """Return the solids of one mesh of a file.
 
     Raises:
         InputError: A shell is open, or its triangles lie on each other.
     """
     joined, _ = merge_corners(mesh, SAME_CORNER * mesh.extent)
-    found = [shell for run in _closed_runs(joined) for shell in _shells(path, run)]
+    found = [shell for run in _list_closed_runs(joined) for shell in _split_into_shells(path, run)]
     require(found, f"{path}: the triangles make no solid; save the part as a closed mesh.")
     require(len(found) <= _MOST_SHELLS, f"{path}: the file holds {len(found)} shells; {_MOST_SHELLS} are the most.")
     # A negative volume: normals point inwards.
     repairs = (INSIDE_OUT,) if sum(shell.volume for shell in found) < 0.0 else ()
-    solids, count = _combine([shell if shell.volume > 0.0 else shell.flip() for shell in found])
+    solids, count = _combine_shells([shell if shell.volume > 0.0 else shell.flip() for shell in found])
     if count < len(found):
         repairs = (*repairs, f"{len(found)} closed shells, some of which go through each other, became {count}")
     for i, solid in enumerate(solids, start=1):
@@ -57,7 +57,7 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
         yield RawSolid(own_name, plain, (SolidPlace(own_name, np.eye(4)),), repairs)
 
 
-def _closed_runs(mesh: Mesh) -> Iterator[Mesh]:
+def _list_closed_runs(mesh: Mesh) -> Iterator[Mesh]:
     """Yield consecutive runs of triangles that are closed surfaces, so that solids that touch stay apart."""
     begin = 0
     open_sides = set[tuple[int, int]]()  # directed edges that still miss their opposite
@@ -72,7 +72,7 @@ def _closed_runs(mesh: Mesh) -> Iterator[Mesh]:
             begin = k
 
 
-def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
+def _split_into_shells(path: Path, mesh: Mesh) -> list[Mesh]:
     """Return the connected surfaces of a mesh, without sheets that enclose no volume."""
     body = convert_to_manifold(mesh)
     if body.status() != manifold3d.Error.NoError:
@@ -97,7 +97,7 @@ def check_closed(path: Path, mesh: Mesh) -> None:
     require(is_solid, f"{path}: neighbouring triangles face different ways; repair the solid in its CAD program.")
 
 
-def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
+def _combine_shells(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
     """Combine shells into solids: shells that cross are united, shells inside others are cavities.
 
     A shell inside an even number of others is an outer surface, inside an odd number a cavity.
@@ -119,7 +119,7 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
             members = np.flatnonzero(group == g).tolist()
             body = manifold3d.Manifold.batch_boolean([bodies[k] for k in members], manifold3d.OpType.Add)
             united.append(shells[members[0]] if len(members) == 1 else convert_to_mesh(body))
-        return _combine(united)  # united shells may be within others, so start over
+        return _combine_shells(united)  # united shells may be within others, so start over
     depth = is_within.sum(axis=1)
     solids = []
     for k in np.flatnonzero(depth % 2 == 0).tolist():  # outer surfaces

@@ -55,7 +55,7 @@ def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]], int]:
             unit, objects, items = _read_models(path, archive)
         # The build is treated as one outer object that holds all items.
         build = _Object("", True, Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), items)
-        placed = _place(path, objects, build, np.eye(4), ())
+        placed = _place_objects(path, objects, build, np.eye(4), ())
         every = [*islice(placed, _MOST_PLACES + 1)]
     except InputError:
         raise
@@ -70,14 +70,14 @@ def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]], int]:
 
 def _read_models(path: Path, archive: ZipFile) -> tuple[str, dict[_Key, _Object], list[tuple[_Key, Array]]]:
     """Return the unit, the objects of all models by key, and the items of the build of the root model."""
-    files = {_file_name(each.filename): each for each in archive.infolist()}
+    files = {_normalise_path(each.filename): each for each in archive.infolist()}
     size = sum(each.file_size for name, each in files.items() if name.endswith((".model", ".rels")))
     require(size <= _LARGEST_BYTES, f"{path}: the 3MF file is larger than {_LARGEST_BYTES / 1e6:g} MB when unpacked.")
     models = {
         name: ElementTree.fromstring(archive.read(each)) for name, each in files.items() if name.endswith(".model")
     }
     related = _ROOT.search(archive.read(files["_rels/.rels"])) if "_rels/.rels" in files else None
-    root = _file_name(related[1].decode()) if related else min(models)
+    root = _normalise_path(related[1].decode()) if related else min(models)
     units = set()
     objects: dict[_Key, _Object] = {}
     for name, model in models.items():
@@ -90,7 +90,7 @@ def _read_models(path: Path, archive: ZipFile) -> tuple[str, dict[_Key, _Object]
     return units.pop(), objects, _read_places(root, models[root].iterfind("{*}build/{*}item"))
 
 
-def _file_name(target: str) -> str:
+def _normalise_path(target: str) -> str:
     """Normalize a path inside the archive for comparison."""
     return target.strip("/").lower()
 
@@ -101,8 +101,10 @@ def _read_object(model: str, element: ElementTree.Element) -> _Object:
     Args:
         model: Path of the model that holds the object.
     """
-    corners = _numbers(element.iterfind("{*}mesh/{*}vertices/{*}vertex"), ("x", "y", "z")).astype(np.float64)
-    triangles = _numbers(element.iterfind("{*}mesh/{*}triangles/{*}triangle"), ("v1", "v2", "v3")).astype(np.int64)
+    corners = _read_attributes(element.iterfind("{*}mesh/{*}vertices/{*}vertex"), ("x", "y", "z")).astype(np.float64)
+    triangles = _read_attributes(element.iterfind("{*}mesh/{*}triangles/{*}triangle"), ("v1", "v2", "v3")).astype(
+        np.int64
+    )
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(corners):
         raise ValueError("a triangle without its corners")
     components = _read_places(model, element.iterfind("{*}components/{*}component"))
@@ -110,7 +112,7 @@ def _read_object(model: str, element: ElementTree.Element) -> _Object:
     return _Object(element.get("name", ""), is_part, Mesh(corners, triangles), components)
 
 
-def _numbers(elements: Iterable[ElementTree.Element], names: tuple[str, str, str]) -> Any:
+def _read_attributes(elements: Iterable[ElementTree.Element], names: tuple[str, str, str]) -> Any:
     """Return three attributes of each element as text, (n, 3)."""
     rows = [[each.attrib[name] for name in names] for each in elements]
     return np.array(rows, dtype=np.str_).reshape(-1, 3)
@@ -130,11 +132,11 @@ def _read_places(model: str, elements: Iterable[ElementTree.Element]) -> list[tu
             T[:3] = np.array(words, dtype=np.float64).reshape(4, 3).T
         # A path in another model, or the same model.
         named = next((value for key, value in each.items() if key.endswith("}path")), model)
-        places.append(((_file_name(named), each.get("objectid", "")), T))
+        places.append(((_normalise_path(named), each.get("objectid", "")), T))
     return places
 
 
-def _place(
+def _place_objects(
     path: Path, objects: dict[_Key, _Object], outer: _Object, T: Array, around: tuple[_Key, ...]
 ) -> Iterator[_Object]:
     """Yield the objects inside another one, at all depths, with meshes moved to their places.
@@ -153,4 +155,4 @@ def _place(
             mesh = mesh.flip()
         placed = _Object(inner.name or outer.name, outer.is_part and inner.is_part, mesh, inner.components)
         yield placed._replace(name=placed.name or f"object{key[1]}")
-        yield from _place(path, objects, placed, here, (*around, key))
+        yield from _place_objects(path, objects, placed, here, (*around, key))

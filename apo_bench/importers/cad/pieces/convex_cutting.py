@@ -9,14 +9,14 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
-from apo_bench.importers.cad.pieces.holes import bore_piece, least_pieces
-from apo_bench.importers.cad.pieces.hollow_parts import Beside
-from apo_bench.importers.cad.pieces.plane_cuts import convex_parts, cut_at_shoulders, snap_to_planes
-from apo_bench.importers.cad.pieces.shafts import as_cylinders, round_shafts
+from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
+from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
+from apo_bench.importers.cad.pieces.hollow_parts import FreeSpace
+from apo_bench.importers.cad.pieces.plane_cuts import cut_at_shoulders, cut_into_convex_parts, snap_to_planes
+from apo_bench.importers.cad.pieces.shafts import convert_to_cylinders, refine_shaft_corners
 from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
 from apo_bench.scenario.parts.limits import MOST_PIECES
-from apo_bench.scenario.parts.mass_checks import touching_groups
+from apo_bench.scenario.parts.mass_checks import group_touching_pieces
 
 _MOST_TRIANGLES = 20_000  # a body with more is simplified first
 _ENTRANCE_MM = 1.0  # a solid nearer to the ends of a hole than this is at its entrance
@@ -28,7 +28,7 @@ _LOSS = 1e-3
 """A piece counts as a hull of a free-form shape if its volume is off by more than this share."""
 
 
-class Cut(NamedTuple):
+class CutSolid(NamedTuple):
     """The convex pieces of a solid."""
 
     pieces: tuple[Hull, ...]
@@ -39,7 +39,7 @@ class Cut(NamedTuple):
     """Names of the round holes that are filled, as pieces around them would be too many."""
 
 
-def cut(raw: RawSolid, others: Array | None = None) -> Cut:
+def cut_solid(raw: RawSolid, others: Array | None = None) -> CutSolid:
     """Cut a solid into convex pieces: exact at flat faces, wedges that touch the fitted wall around round holes.
 
     Args:
@@ -56,19 +56,19 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     # Planes n . x = d.
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
     size = raw.mesh.extent
-    for bore in bores:  # fill the hole for now; `_bore` cuts it again with wedges
+    for bore in bores:  # fill the hole for now; `_bore_holes` cuts it again with wedges
         body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
     if body.num_tri() > _MOST_TRIANGLES:
         body = body.simplify(min(1e-3 * size, 0.01))
     hulls = 0
     outlines: list[Array] = []
-    beside = Beside(size, flats, None if others is None else cKDTree(others))
-    for part in cut_at_shoulders(convex_parts(body, beside), shafts, size):
-        coarse = merge_near_points(snap_to_planes(corners_of(part.body), part.planes, size))
+    beside = FreeSpace(size, flats, None if others is None else cKDTree(others))
+    for part in cut_at_shoulders(cut_into_convex_parts(body, beside), shafts, size):
+        coarse = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):
             continue
-        fine = round_shafts(coarse, shafts)
-        corners = hull_corners(fine, flats, part.planes)
+        fine = refine_shaft_corners(coarse, shafts)
+        corners = list_hull_corners(fine, flats, part.planes)
         # A hull fills concave parts, and loses volume where corners are dropped; rounded walls are no error.
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
@@ -77,20 +77,20 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     # Most important holes first: those that other solids come near, then the widest.
     kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
     # Unused holes, such as screw holes, are filled from the least important one if all of them need too many wedges.
-    while others is not None and kept and least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
+    while others is not None and kept and count_least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
         kept.pop()
-    pieces = _bore(outlines, kept, flats)
+    pieces = _bore_holes(outlines, kept, flats)
     while pieces is None and kept:
         # Fill at least a quarter of the holes, the least important ones.
-        kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // least_pieces(kept)))]
-        pieces = _bore(outlines, kept, flats)
+        kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // count_least_pieces(kept)))]
+        pieces = _bore_holes(outlines, kept, flats)
     if pieces is None:
         raise InputError(
             f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
             "out fillets and free surfaces."
         )
-    whole, lost = _drop_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
-    return Cut(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept))
+    whole, lost = _drop_crumbs(list(convert_to_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
+    return CutSolid(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept))
 
 
 def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int]:
@@ -102,14 +102,14 @@ def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int]:
     Returns:
         The remaining pieces, and the number of dropped groups.
     """
-    loose = sorted(touching_groups(pieces), key=len)[:-1]  # all groups but the one with most pieces
+    loose = sorted(group_touching_pieces(pieces), key=len)[:-1]  # all groups but the one with most pieces
     volumes = [sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group) for group in loose]
     crumbs = [group for group, volume in zip(loose, volumes, strict=True) if volume < most]
     dropped = set[int]().union(*crumbs)
     return [piece for k, piece in enumerate(pieces) if k not in dropped], len(crumbs)
 
 
-def _bore(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:
+def _bore_holes(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:
     """Return all pieces with the holes cut out, [m]; None if there are too many.
 
     Args:
@@ -117,7 +117,7 @@ def _bore(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> l
         flats: Planes of flat faces, (k, 4).
     """
     pieces: list[Hull] = []
-    for corners in outlines if least_pieces(bores) <= MOST_PIECES else ():
+    for corners in outlines if count_least_pieces(bores) <= MOST_PIECES else ():
         pieces += [Hull("", 1e-3 * each) for each in bore_piece(corners, bores, flats, MOST_PIECES - len(pieces))]
         if len(pieces) > MOST_PIECES:
             return None

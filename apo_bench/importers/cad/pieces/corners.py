@@ -31,13 +31,13 @@ _LEFT_MM = 0.02
 """A reduced piece is good enough if no corner sticks out farther."""
 
 
-def corners_of(body: Any) -> Array:
+def list_body_corners(body: Any) -> Array:
     """Return the corners of a manifold3d body, (k, 3)."""
     raw = body.to_mesh64()
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
-def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+def list_hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """Return the corners of the convex hull of points, (k, 3); if there are too many, the outermost ones.
 
     Args:
@@ -53,17 +53,17 @@ def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array
         if not inside.any():
             break
         corners = corners[~inside]
-    return np.asarray(corners) if _is_simple(corners) else _reduce(corners, np.concatenate([flats, cuts]))
+    return np.asarray(corners) if _is_simple(corners) else _reduce_corners(corners, np.concatenate([flats, cuts]))
 
 
-def _reduce(corners: Array, planes: Array) -> Array:
+def _reduce_corners(corners: Array, planes: Array) -> Array:
     """Reduce the corners of a piece to the limits: keep the outermost, then add those that stick out most.
 
     Args:
         planes: Of flat faces and cuts, (k, 4), whose outlines are kept first.
     """
     for many in _IN_PLANE:
-        kept = np.union1d(_on_flats(corners, planes, many), (corners @ _DIRECTIONS.T).argmax(axis=0))
+        kept = np.union1d(_find_outermost_on_flats(corners, planes, many), (corners @ _DIRECTIONS.T).argmax(axis=0))
         best = corners[kept]
         if _is_simple(best):
             break
@@ -83,7 +83,7 @@ def _is_simple(corners: Array) -> bool:
     return len(corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
 
 
-def _on_flats(corners: Array, flats: Array, many: int) -> Any:
+def _find_outermost_on_flats(corners: Array, flats: Array, many: int) -> Any:
     """Return the indices of the outermost corners in each flat face, in `many` directions each."""
     kept = [np.zeros(0, dtype=np.intp)]
     turn = 2.0 * np.pi * np.arange(many) / many

@@ -18,7 +18,7 @@ class CutPart(NamedTuple):
     planes: Array
     """Planes n . x = d along which it was cut, (k, 4)."""
 
-    def halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
+    def cut_in_halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
         """Return the parts above and below the plane n . x = d, each trimmed by `hair` on its side of the plane.
 
         Trimming exactly on the plane would leave sheets of no thickness, by rounding.
@@ -28,7 +28,7 @@ class CutPart(NamedTuple):
         return above, CutPart(self.body.trim_by_plane(-n, hair - d), planes)
 
 
-def bodies_of(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
+def list_bodies(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
     """Return the connected bodies of both halves, without those below a volume, [mm^3]."""
     every = (CutPart(body, half.planes) for half in halves for body in half.body.decompose())
     return [each for each in every if each.body.volume() > least]
@@ -44,10 +44,10 @@ def cut_through(part: CutPart, point: Array, normals: Array, least: float, hair:
     best = [part]
     smallest = np.inf
     for n in normals:
-        halves = part.halves(n, float(n @ point), hair)
-        bodies = bodies_of(halves, least)
+        cut_in_halves = part.cut_in_halves(n, float(n @ point), hair)
+        bodies = list_bodies(cut_in_halves, least)
         filled = sum(each.body.hull().volume() for each in bodies)
-        if filled < smallest and min(half.body.volume() for half in halves) > least:
+        if filled < smallest and min(half.body.volume() for half in cut_in_halves) > least:
             smallest = filled
             best = bodies
     return best

@@ -9,11 +9,11 @@ import numpy as np
 from shapely import MultiPoint, Point
 
 from apo_bench.geometry import Array, count_sides
-from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
+from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 
 
-def least_pieces(bores: Sequence[Region]) -> int:
+def count_least_pieces(bores: Sequence[Region]) -> int:
     """Return the smallest number of wedges that surround round holes."""
     return sum(count_sides(1e-3 * max(bore.radii)) for bore in bores)
 
@@ -27,27 +27,33 @@ def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int)
         most: Cutting stops once there are more pieces than this.
     """
     parts = [manifold3d.Manifold.hull_points(corners)]
-    bores = [bore for bore in bores if _meets(parts[0], bore)]
+    bores = [bore for bore in bores if _overlaps_hole(parts[0], bore)]
     if not bores:
         return [corners]
     # First cut halfway between parallel holes, so that wedges around one hole do not run into another.
     for a, b in combinations(bores, 2):
-        plane = _between(a, b)
+        plane = _find_plane_between(a, b)
         if plane is not None:
             parts = [
                 half
                 for part in parts
-                for half in (part.split_by_plane(*plane) if _meets(part, a) and _meets(part, b) else (part,))
+                for half in (
+                    part.split_by_plane(*plane) if _overlaps_hole(part, a) and _overlaps_hole(part, b) else (part,)
+                )
             ]
     for bore in bores:
         if len(parts) > most:
             break
-        parts = [piece for part in parts for piece in (_around(part, bore) if _meets(part, bore) else (part,))]
-    points = [merge_near_points(corners_of(part)) for part in parts if not part.is_empty()]
-    return [hull_corners(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
+        parts = [
+            piece
+            for part in parts
+            for piece in (_cut_around_hole(part, bore) if _overlaps_hole(part, bore) else (part,))
+        ]
+    points = [merge_near_points(list_body_corners(part)) for part in parts if not part.is_empty()]
+    return [list_hull_corners(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
 
 
-def _between(a: Region, b: Region) -> tuple[Array, float] | None:
+def _find_plane_between(a: Region, b: Region) -> tuple[Array, float] | None:
     """Return the plane n . x = d halfway between the walls of parallel holes; None for other or overlapping holes."""
     if np.linalg.norm(np.cross(a.direction, b.direction)) > 1e-6:
         return None
@@ -59,14 +65,14 @@ def _between(a: Region, b: Region) -> tuple[Array, float] | None:
     return (off / gap, float(off / gap @ a.point + max(a.radii) + room / 2.0)) if room > 0.0 else None
 
 
-def _meets(part: Any, bore: Region) -> bool:
+def _overlaps_hole(part: Any, bore: Region) -> bool:
     """Whether a convex part overlaps a hole: in its range of heights, and seen along its axis."""
     if part.is_empty():
         return False
     low, high = np.array(part.bounding_box()).reshape(2, 3)
     if (low > bore.box[1]).any() or (high < bore.box[0]).any():
         return False
-    corners = corners_of(part)
+    corners = list_body_corners(part)
     height, _, _ = bore.polar(corners)
     if height.max() < bore.span[0] + SAME_CORNER_MM or height.min() > bore.span[1] - SAME_CORNER_MM:
         return False
@@ -75,7 +81,7 @@ def _meets(part: Any, bore: Region) -> bool:
     return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_CORNER_MM)
 
 
-def _around(part: Any, bore: Region) -> Iterator[Any]:
+def _cut_around_hole(part: Any, bore: Region) -> Iterator[Any]:
     """Yield what remains of a convex part around a hole: parts above and below, and wedges that touch its wall."""
     axis = bore.direction
     x, y = bore.across

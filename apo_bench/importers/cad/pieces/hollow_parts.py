@@ -31,7 +31,7 @@ _AT_ONCE = 2_000_000
 """Distances that are computed at once, to limit the memory."""
 
 
-class Beside(NamedTuple):
+class FreeSpace(NamedTuple):
     """The surroundings of a solid, which decide where its pieces must be exact."""
 
     size: float
@@ -48,16 +48,16 @@ class Beside(NamedTuple):
             mesh: The part.
             planes: Planes of the hull.
         """
-        is_near = self.is_near(points) | (len(points) > 0 and self._reaches(mesh.corners, planes))
+        is_near = self.is_near(points) | (len(points) > 0 and self._contains_other_points(mesh.corners, planes))
         return np.where(is_near, _DEEP_MM, max(_FAR * self.size, _DEEP_MM))
 
-    def _reaches(self, corners: Array, planes: Array) -> bool:
+    def _contains_other_points(self, corners: Array, planes: Array) -> bool:
         """Whether points of other solids are inside the hull of corners, (k, 3)."""
         if self.others is None:
             return False
         points = self.others.data
         points = points[((points > corners.min(axis=0)) & (points < corners.max(axis=0))).all(axis=1)]
-        return bool((depths(points, planes) > _DEEP_MM).any())
+        return bool((measure_depths(points, planes) > _DEEP_MM).any())
 
     def is_near(self, points: Array) -> Any:
         """Return which points have other solids near, (k,); all if the others are unknown."""
@@ -66,7 +66,7 @@ class Beside(NamedTuple):
         return np.isfinite(self.others.query(points, distance_upper_bound=_NEAR_MM)[0])
 
 
-class _Fault(NamedTuple):
+class _HullDeviation(NamedTuple):
     """The point at which a part deviates most from its hull."""
 
     share: float
@@ -76,7 +76,7 @@ class _Fault(NamedTuple):
     """Normals of the sides at the point, (k, 3)."""
 
 
-def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
+def refine_pieces(parts: Iterable[CutPart], beside: FreeSpace, volume: float, hair: float) -> Iterator[CutPart]:
     """Cut parts further at their worst faults, the worst first, up to the largest number of pieces.
 
     Args:
@@ -84,7 +84,9 @@ def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair:
         hair: Distance of a cut from its plane, [mm].
     """
     ticket = count()  # breaks ties, as parts cannot be compared
-    queue = [(-fault.share, next(ticket), part, fault) for part in parts for fault in [_worst_fault(part, beside)]]
+    queue = [
+        (-fault.share, next(ticket), part, fault) for part in parts for fault in [_find_worst_deviation(part, beside)]
+    ]
     heapify(queue)
     done = 0
     most = _ALONE if beside.others is None else _TOGETHER
@@ -92,29 +94,29 @@ def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair:
     while queue:
         share, _, part, fault = heappop(queue)
         is_cut = share < 0.0 and done + len(queue) < most
-        pieces = _cut_at(part, fault, SLIVER * volume, hair) if is_cut else [part]
+        pieces = _cut_at_deviation(part, fault, SLIVER * volume, hair) if is_cut else [part]
         if len(pieces) < 2:
             done += 1
             yield part
             continue
         for each in pieces:
-            fault = _worst_fault(each, beside)
+            fault = _find_worst_deviation(each, beside)
             heappush(queue, (-fault.share, next(ticket), each, fault))
 
 
-def _worst_fault(part: CutPart, beside: Beside) -> _Fault:
+def _find_worst_deviation(part: CutPart, beside: FreeSpace) -> _HullDeviation:
     """Return the worst fault of a part, over corners and middles of edges and sides."""
     mesh = convert_to_mesh(part.body)
-    planes = _planes(mesh.corners)
+    planes = _list_hull_planes(mesh.corners)
     middles = [mesh.corners[each].mean(axis=1) for each in (mesh.edges, mesh.triangles)]
     points = np.concatenate([mesh.corners, *middles])
-    depth = depths(points, planes) if len(planes) else np.zeros(len(points))
+    depth = measure_depths(points, planes) if len(planes) else np.zeros(len(points))
     points, depth = points[depth > _FLUSH_MM], depth[depth > _FLUSH_MM]
     share = depth / beside.allowed_depth(points, mesh, planes)
     if len(share) and share.max() > 1.0:
         k = int(share.argmax())
-        return _Fault(float(share[k]), points[k], _normals_at(mesh, points[k]))
-    return _Fault(0.0, mesh.corners[0], np.zeros((0, 3)))
+        return _HullDeviation(float(share[k]), points[k], _normals_at(mesh, points[k]))
+    return _HullDeviation(0.0, mesh.corners[0], np.zeros((0, 3)))
 
 
 def _normals_at(mesh: Mesh, point: Array) -> Array:
@@ -128,7 +130,7 @@ def _normals_at(mesh: Mesh, point: Array) -> Array:
     return np.asarray(mesh.across[sides] / length[sides, None])
 
 
-def _planes(corners: Array) -> Array:
+def _list_hull_planes(corners: Array) -> Array:
     """Return the planes n . x = d of the sides of a hull, without duplicates, (k, 4); none if the hull is flat."""
     try:
         planes = ConvexHull(corners).equations * [1.0, 1.0, 1.0, -1.0]
@@ -137,7 +139,7 @@ def _planes(corners: Array) -> Array:
     return np.asarray(planes[np.unique(np.round(planes, 9), axis=0, return_index=True)[1]])
 
 
-def _cut_at(part: CutPart, fault: _Fault, least: float, hair: float) -> list[CutPart]:
+def _cut_at_deviation(part: CutPart, fault: _HullDeviation, least: float, hair: float) -> list[CutPart]:
     """Cut a part through its worst point along the plane whose halves have the least hull volume.
 
     Args:
@@ -154,7 +156,7 @@ def _cut_at(part: CutPart, fault: _Fault, least: float, hair: float) -> list[Cut
     return cut_through(part, fault.point, normals, least, hair)
 
 
-def depths(points: Array, planes: Array) -> Array:
+def measure_depths(points: Array, planes: Array) -> Array:
     """Return the depth of points, (k, 3), below the nearest plane of a hull, n . x = d, (p, 4); negative outside."""
     many = max(1, _AT_ONCE // max(len(planes), 1))
     chunks = [points[i : i + many] for i in range(0, len(points), many)]

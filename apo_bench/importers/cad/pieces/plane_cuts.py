@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.pieces.corners import corners_of
+from apo_bench.importers.cad.pieces.corners import list_body_corners
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.pieces.hollow_parts import Beside, refine_pieces
+from apo_bench.importers.cad.pieces.hollow_parts import FreeSpace, refine_pieces
 from apo_bench.importers.cad.solids import Region, convert_to_mesh
 
 _MOST_CUTS = 400  # in one solid
@@ -22,31 +22,35 @@ _ROUGH = 0.01  # volume that hulls may add, as a share of the solid's
 _FINE_TRIANGLES = 4000  # a shape with more triangles is simplified before it is bisected
 
 
-def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
+def cut_into_convex_parts(solid: Any, beside: FreeSpace) -> Iterator[CutPart]:
     """Yield parts that are convex, or whose hulls stand for a hollow free-form shape."""
     volume = solid.volume()
-    yield from refine_pieces(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
+    yield from refine_pieces(
+        _cut_flats_then_free_form(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size
+    )
 
 
-def _parts(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
+def _cut_flats_then_free_form(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
     """Yield the parts of a solid after cuts along its flat faces, then through free-form shapes.
 
     Args:
         size, volume: Of the whole solid.
         flats: Planes of flat faces, (k, 4).
     """
-    cuts = [_MOST_CUTS]  # cuts left, in a list because `_cut` counts it down
-    for part in _cut(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
-        planes = _reflex_planes(part.body, size)
-        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _spare(part) < 1e-3 * part.body.volume()):
+    cuts = [_MOST_CUTS]  # cuts left, in a list because `_cut_at_reflex_edges` counts it down
+    for part in _cut_at_reflex_edges(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
+        planes = _list_reflex_planes(part.body, size)
+        if not len(planes) or (
+            part.body.num_tri() > _FINE_TRIANGLES and _measure_hull_excess(part) < 1e-3 * part.body.volume()
+        ):
             yield part
         elif len(planes) <= _MOST_FREE_PLANES:
-            yield from _cut(part, size, flats, False, cuts, volume)
+            yield from _cut_at_reflex_edges(part, size, flats, False, cuts, volume)
         else:
-            yield from _halved(part, size, volume)
+            yield from _bisect_hollow_part(part, size, volume)
 
 
-def _cut(
+def _cut_at_reflex_edges(
     part: CutPart, size: float, flats: Array, only_flats: bool, cuts: list[int], volume: float
 ) -> Iterator[CutPart]:
     """Cut a part along planes of reflex edges while cuts are left, and yield what needs or allows no more cuts.
@@ -69,8 +73,8 @@ def _cut(
             each = CutPart(body, along)
             # Take the first of the best planes that leaves volume on both sides. A cavity is also cut through its
             # middle, since planes of reflex edges may miss it.
-            planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
-            for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
+            planes = _list_cut_planes(body, size, flats, only_flats) if cuts[0] > 0 else []
+            for n, d in [*planes[:_TRIES], *_list_cavity_planes(body, least)]:
                 halves = each.halves(n, d, HAIR * size)
                 if min(half.body.volume() for half in halves) > least:
                     cuts[0] -= 1
@@ -80,7 +84,7 @@ def _cut(
                 yield each
 
 
-def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
+def _list_cavity_planes(body: Any, least: float) -> Iterator[tuple[Array, float]]:
     """Yield planes (n, d) through the middle of a cavity, across its shortest side first; none without a cavity.
 
     Args:
@@ -93,7 +97,7 @@ def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
                 yield np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0
 
 
-def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> list[tuple[Array, float]]:
+def _list_cut_planes(body: Any, size: float, flats: Array, only_flats: bool) -> list[tuple[Array, float]]:
     """Return the planes (n, d) of reflex edges, those with the longest edges first.
 
     A plane within tolerance of a flat face is replaced by the exact plane of that face.
@@ -103,7 +107,7 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
         only_flats: Whether to leave out planes that are no flat faces.
     """
     planes = []
-    for plane in _reflex_planes(body, size):
+    for plane in _list_reflex_planes(body, size):
         # Sides of a cut body are rounded, the planes of the original faces are not.
         cosine = flats[:, :3] @ plane[:3]
         same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < HAIR * size)
@@ -111,12 +115,12 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
     return [(plane[:3], float(plane[3])) for plane in planes]
 
 
-def _spare(part: CutPart) -> float:
+def _measure_hull_excess(part: CutPart) -> float:
     """Return the volume that the hull of a part adds to the part, [mm^3]."""
     return float(part.body.hull().volume() - part.body.volume())
 
 
-def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
+def _bisect_hollow_part(part: CutPart, size: float, volume: float) -> list[CutPart]:
     """Bisect a hollow free-form shape until its hulls add little volume.
 
     Args:
@@ -124,14 +128,16 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
     """
     body = part.body.simplify(min(1e-3 * size, 0.01)) if part.body.num_tri() > _FINE_TRIANGLES else part.body
     parts = [CutPart(each, part.planes) for each in body.decompose()]
-    spare = [_spare(each) for each in parts]
+    spare = [_measure_hull_excess(each) for each in parts]
     while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):
         # Take the part whose hull adds most; a part that no cut improves counts as done.
         k = int(np.argmax(spare))
         low, high = np.reshape(parts[k].body.bounding_box(), (2, 3))
         halves = cut_through(parts[k], (low + high) / 2.0, np.eye(3), SLIVER * volume, HAIR * size)
         parts[k : k + 1] = halves
-        spare[k : k + 1] = [_spare(each) for each in halves] if len(halves) > 1 else [0.0]  # 0 marks it as done
+        spare[k : k + 1] = (
+            [_measure_hull_excess(each) for each in halves] if len(halves) > 1 else [0.0]
+        )  # 0 marks it as done
     return parts
 
 
@@ -144,23 +150,23 @@ def cut_at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: f
     """
     for part in parts:
         # A part with at least six corners on the wall of a shaft is a part of that shaft.
-        corners = corners_of(part.body)
+        corners = list_body_corners(part.body)
         mine = [shaft for shaft in shafts if shaft.is_on_wall(corners, 1e-3).sum() >= 6]
         slices = [part]
         if len(mine) > 1:
             # Plane of each end.
             for n, d in ((s.direction, float(s.point @ s.direction) + end) for s in mine for end in s.span):
-                slices = [half for each in slices for half in _across(each, n, d, HAIR * size)]
+                slices = [half for each in slices for half in _cut_if_crossed(each, n, d, HAIR * size)]
         yield from slices
 
 
-def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]:
+def _cut_if_crossed(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]:
     """Return both halves of a part, or the part alone where the plane misses it.
 
     Args:
         hair: Distance of a cut from its plane, [mm].
     """
-    height = corners_of(part.body) @ n - d
+    height = list_body_corners(part.body) @ n - d
     is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
     return (part,) if is_beside else part.halves(n, d, hair)
 
@@ -177,7 +183,7 @@ def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
     return corners
 
 
-def _reflex_planes(body: Any, size: float) -> Array:
+def _list_reflex_planes(body: Any, size: float) -> Array:
     """Return planes n . x = d of sides at reflex edges, (k, 4), those with the longest edges first.
 
     Args:

@@ -15,7 +15,7 @@ _WIDER = 1.6
 """A gap between corners of a ring that is wider than the median by this factor is no part of the wall."""
 
 
-def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
+def refine_shaft_corners(corners: Array, shafts: Sequence[Region]) -> Array:
     """Return the corners of a piece, (k, 3), with rings of corners on shafts refined to the fitted wall.
 
     Whole circles of corners are replaced by evenly spaced ones; arcs get further corners in between.
@@ -23,9 +23,9 @@ def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
     added = []
     dropped = np.zeros(len(corners), dtype=bool)
     # The shaft with most corners first.
-    for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):
+    for shaft in sorted(shafts, key=lambda shaft: -int(_lies_on_shaft(corners, shaft).sum())):
         height, _, angle = shaft.polar(corners)
-        on = _on_wall(corners, shaft) & ~dropped
+        on = _lies_on_shaft(corners, shaft) & ~dropped
         if on.sum() < 3:
             continue
         # Corners form rings, one for each height. New corners lie on the true circle, so that more of them bring the
@@ -33,7 +33,7 @@ def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
         count = count_sides(1e-3 * max(shaft.radii))
         for h in np.unique(np.round(height[on], 3)):
             mine = on & (np.abs(height - h) < 2e-3)
-            angles, is_whole = _around_axis(np.sort(angle[mine]), count)
+            angles, is_whole = _list_added_angles(np.sort(angle[mine]), count)
             dropped |= mine & is_whole
             if len(angles):
                 level = float(height[mine].mean())
@@ -44,13 +44,13 @@ def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
     return np.asarray(every[np.sort(ConvexHull(every).vertices)])
 
 
-def _on_wall(corners: Array, shaft: Region) -> Any:
+def _lies_on_shaft(corners: Array, shaft: Region) -> Any:
     """Return which corners, (k, 3), are on the wall of a shaft, (k,); the tip of a cone does not count."""
     on = shaft.is_on_wall(corners, max(1e-5 * max(shaft.radii), SAME_CORNER_MM))
     return on & (shaft.polar(corners)[1] > SAME_CORNER_MM)
 
 
-def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
+def _list_added_angles(ring: Array, count: int) -> tuple[Array, bool]:
     """Return the angles of the corners to add to a ring, and whether they replace the whole ring.
 
     Args:
@@ -69,14 +69,14 @@ def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
     return np.concatenate([ring[:0], *(a + gap * np.arange(1, n) / n for a, gap, n in near)]), False
 
 
-def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:
+def convert_to_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:
     """Yield the pieces, [m], with those whose corners are all on the two ends of a cylinder made true cylinders."""
     cylinders = [s for s in shafts if s.kind == "cylinder" and THINNEST_M <= 1e-3 * s.radii[0] <= WIDEST_M]
     for piece in pieces:
-        yield next((whole for shaft in cylinders if (whole := _as_cylinder(piece, shaft)) is not None), piece)
+        yield next((whole for shaft in cylinders if (whole := _convert_to_cylinder(piece, shaft)) is not None), piece)
 
 
-def _as_cylinder(piece: Hull, shaft: Region) -> Hull | None:
+def _convert_to_cylinder(piece: Hull, shaft: Region) -> Hull | None:
     """Return a piece as a true cylinder, [m]; None if some corner is not on the two end circles of the shaft."""
     corners = 1e3 * piece.corners
     radius = shaft.radii[0]

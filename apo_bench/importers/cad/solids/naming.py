@@ -27,10 +27,10 @@ def name_regions(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
     Faces of one kind are numbered from the outermost plane or the widest wall, then by place. Free-form surfaces and
     walls that do not go all the way round get no name.
     """
-    stems = [_stem(region) for region in regions]
+    stems = [_name_stem(region) for region in regions]
     numbers = Counter[str]()
     named = list(regions)
-    for k in sorted(range(len(regions)), key=lambda k: _order(mesh, regions[k])):
+    for k in sorted(range(len(regions)), key=lambda k: _sort_key(mesh, regions[k])):
         stem = stems[k]
         numbers[stem] += 1
         is_outermost_side = len(stem) == 2 and numbers[stem] == 1
@@ -67,13 +67,13 @@ def make_part_name(text: str, used: Container[str]) -> str:
 
     Letters with accents become plain ones. A text with letters that have no Latin form gives `part_1`, `part_2`, ...
     """
-    plain = _latin(text)
+    plain = _to_latin(text)
     if not plain.strip("_"):
         return next(free for free in (f"part_{n}" for n in count(1)) if free not in used)
     return find_free_name(plain if plain[:1].isalpha() else f"part_{plain}", used)
 
 
-def _latin(text: str) -> str:
+def _to_latin(text: str) -> str:
     """Return a text in ASCII letters, digits and underscores; empty if a letter has no Latin form."""
     plain = ""
     for c in normalize("NFKD", text):
@@ -95,7 +95,7 @@ def find_free_name(name: str, used: Container[str]) -> str:
     return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
-def _stem(region: Region) -> str:
+def _name_stem(region: Region) -> str:
     """Return the name of a region without its number; empty for a region that gets no name."""
     if region.kind == "plane":
         axis = int(np.abs(region.direction).argmax())
@@ -105,7 +105,7 @@ def _stem(region: Region) -> str:
     return whole if region.is_whole else ""
 
 
-def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
+def _sort_key(mesh: Mesh, region: Region) -> tuple[float, ...]:
     """Return the sort key of a region: outermost plane or widest wall first, then by its lowest corner."""
     low = mesh.corners[np.unique(mesh.triangles[region.triangles])].min(axis=0)
     first = float(region.direction @ region.point) if region.kind == "plane" else max(region.radii)

@@ -8,7 +8,7 @@ import numpy as np
 from OCP import Bnd, BRep, BRepAdaptor, BRepBndLib, BRepMesh, ShapeAnalysis, TopAbs, TopExp, TopLoc, TopoDS, gp
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.faces.surface_fitting import Round
+from apo_bench.importers.cad.faces.surface_fitting import RoundSurface
 from apo_bench.importers.cad.solids import SolidPlace
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.importers.cad.step.tree import matrix_of, read_leaves
@@ -73,14 +73,14 @@ def _face(face: Any) -> BrepFace:
     if face.Orientation() == TopAbs.TopAbs_REVERSED:
         triangles = triangles[:, ::-1]
     shape, residual = _elementary(face)
-    surface: Plane | Round | None = None
+    surface: Plane | RoundSurface | None = None
     if shape is not None:
         at, along = _xyz(shape.Location()), _xyz(shape.Axis().Direction())
         surface = Plane(at, along)
         if isinstance(shape, gp.gp_Cylinder):
-            surface = Round(at, along, shape.Radius(), 0.0)
+            surface = RoundSurface(at, along, shape.Radius(), 0.0)
         elif isinstance(shape, gp.gp_Cone):
-            surface = Round(at, along, shape.RefRadius(), float(np.tan(shape.SemiAngle())))
+            surface = RoundSurface(at, along, shape.RefRadius(), float(np.tan(shape.SemiAngle())))
     return BrepFace(surface, residual, corners, triangles)
 
 

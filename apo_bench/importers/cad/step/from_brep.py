@@ -9,11 +9,11 @@ from scipy.spatial import ConvexHull
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.surface_fitting import (
-    Round,
-    border_of,
+    RoundSurface,
+    list_border_corners,
+    make_plane_region,
+    make_round_region,
     measure_wall_turn,
-    plane_region,
-    round_region,
 )
 from apo_bench.importers.cad.meshes.corner_merging import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
@@ -65,7 +65,7 @@ def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     return mesh, owner[has_three]
 
 
-def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> tuple[Mesh, Any]:
+def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | RoundSurface | None]) -> tuple[Mesh, Any]:
     """Return the mesh with walls between two circles retriangulated in strips from end to end, and its new `owner`.
 
     Args:
@@ -73,7 +73,7 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> 
     """
     for k, wall in enumerate(surfaces):
         mine = np.flatnonzero(owner == k)
-        if not isinstance(wall, Round) or not len(mine) or measure_wall_turn(mesh, mine, wall) < WHOLE_TURN:
+        if not isinstance(wall, RoundSurface) or not len(mine) or measure_wall_turn(mesh, mine, wall) < WHOLE_TURN:
             continue
         strips = _strips(mesh, mine, wall)
         if strips is not None:
@@ -82,14 +82,14 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> 
     return mesh.part(np.arange(len(mesh.triangles))), owner
 
 
-def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
+def _strips(mesh: Mesh, triangles: Any, wall: RoundSurface) -> Any:
     """Return triangles, (s, 3), that replace those of a wall: the sides of the hull of its border and of a cone's tip.
 
     None if the ends are not two circles square to the axis, nor a circle and a tip.
     """
     near = _LEVEL * mesh.extent
     every = np.unique(mesh.triangles[triangles])
-    every = every[np.isin(every, border_of(mesh, triangles)) | (wall.polar(mesh.corners[every])[1] < near)]
+    every = every[np.isin(every, list_border_corners(mesh, triangles)) | (wall.polar(mesh.corners[every])[1] < near)]
     points = mesh.corners[every]
     height = wall.polar(points)[0]
     if (np.minimum(height - height.min(), height.max() - height) > near).any():
@@ -103,7 +103,7 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
     return every[np.where((outward * before > 0.0)[:, None], sides, sides[:, ::-1])]
 
 
-def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region:
+def _region(mesh: Mesh, triangles: Any, surface: Plane | RoundSurface | None) -> Region:
     """Return the region of triangles on a surface; None means a free-form surface."""
     if surface is None:
         return Region("other", triangles)
@@ -111,7 +111,7 @@ def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region
     if isinstance(surface, Plane):
         # The file's normal may point inwards; 1.0 for a face without area.
         sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
-        return plane_region(triangles, sign * surface.normal, surface.point)
+        return make_plane_region(triangles, sign * surface.normal, surface.point)
     _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
-    return round_region(mesh, triangles, surface, hole, measure_wall_turn(mesh, triangles, surface))
+    return make_round_region(mesh, triangles, surface, hole, measure_wall_turn(mesh, triangles, surface))

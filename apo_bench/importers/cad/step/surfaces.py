@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.faces.surface_fitting import Round
+from apo_bench.importers.cad.faces.surface_fitting import RoundSurface
 from apo_bench.importers.cad.solids import SolidPlace
 
 _SAME = 1e-6
@@ -23,7 +23,7 @@ class Plane(NamedTuple):
 class BrepFace(NamedTuple):
     """A face of a B-rep solid."""
 
-    surface: Plane | Round | None
+    surface: Plane | RoundSurface | None
     """The surface of a face that can make contacts; None for free-form faces."""
     residual: float
     """Largest distance between a spline and that surface."""
@@ -53,7 +53,10 @@ def is_same_surface(first: BrepFace, second: BrepFace, size: float) -> bool:
     if isinstance(a, Plane) and isinstance(b, Plane):
         is_parallel = np.linalg.norm(np.cross(a.normal, b.normal)) <= near_rad
         return bool(is_parallel and abs((b.point - a.point) @ a.normal) < near)
-    if not (isinstance(a, Round) and isinstance(b, Round)) or np.linalg.norm(np.cross(a.axis, b.axis)) > near_rad:
+    if (
+        not (isinstance(a, RoundSurface) and isinstance(b, RoundSurface))
+        or np.linalg.norm(np.cross(a.axis, b.axis)) > near_rad
+    ):
         return False
     # Measure the second surface from the axis of the first: its axis may be reversed, and its radius stated elsewhere.
     height, distance, _ = a.polar(b.point[None])

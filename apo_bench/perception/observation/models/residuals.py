@@ -261,7 +261,7 @@ def match_rows(
     partner = np.full(len(truth.where), -1, dtype=np.int64)
     for there, seen in _group_rows(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
-            raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
+            raise InputError(f"{estimates.location(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
         symmetry = (symmetries or {}).get(int(truth.where[there[0], 2]))
         i, j = linear_sum_assignment(_distances(estimates, seen, truth.t_mm[there], symmetry))
         partner[there[i]] = seen[j]

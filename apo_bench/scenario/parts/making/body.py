@@ -50,7 +50,7 @@ class Body:
         t = 1e-3 * np.asarray(at_mm)
         R = np.where(np.abs(R) < 1e-15, 0.0, R)  # right angles stay exact
         return Body(
-            tuple(_moved_piece(piece, R, t) for piece in self.pieces),
+            tuple(_move_piece(piece, R, t) for piece in self.pieces),
             tuple(
                 replace(f, outline=f.outline @ R.T + t, holes=tuple(hole @ R.T + t for hole in f.holes))
                 for f in self.flats
@@ -100,13 +100,13 @@ def join(*bodies: Body) -> Body:
     rounds = [face for body in bodies for face in body.rounds]
     return Body(
         tuple(piece for body in bodies for piece in body.pieces),
-        tuple(_joined_flats(flats)),
-        tuple(_joined_rounds(rounds)),
+        tuple(_join_flats(flats)),
+        tuple(_join_rounds(rounds)),
         sum_moments(bodies[0].moments, (body.moments for body in bodies[1:])),
     )
 
 
-def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
+def _move_piece(piece: Hull, R: Array, t: Array) -> Hull:
     """The piece after x -> R x + t."""
     cylinder = piece.cylinder
     if cylinder is not None:
@@ -114,7 +114,7 @@ def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
     return Hull(piece.name, piece.corners @ R.T + t, cylinder)
 
 
-def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
+def _join_flats(flats: Sequence[Face]) -> Iterable[Face]:
     """Join flat faces plane by plane.
 
     In each plane the areas of opposite faces are subtracted from each other, and faces of one name and fit are merged.
@@ -125,7 +125,7 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
         d = float(n @ left[0].outline[0])
         on = [f for f in left if abs(abs(n @ f.normal) - 1.0) < _PARALLEL and abs(n @ f.outline[0] - d) < _SAME_M]
         left = [f for f in left if not any(f is each for each in on)]
-        to_plane = _plane(n)
+        to_plane = _plane_basis(n)
         same = [(f, make_flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal > 0.0]
         other = [(f, make_flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal < 0.0]
         if not other and len(same) == 1:
@@ -138,19 +138,19 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
                 by_name.setdefault((face.name, face.fit), []).append(area)
             for (name, fit), areas in by_name.items():
                 rest = shapely.set_precision(shapely.unary_union(areas), 0.0).difference(against)
-                for polygon in _apart(rest):
+                for polygon in _split_at_points(rest):
                     if not polygon.buffer(-_NARROW_M / 2).is_empty:
-                        yield _face(name, fit, polygon, to_plane, d, sign)
+                        yield _make_face(name, fit, polygon, to_plane, d, sign)
 
 
-def _apart(area: Any) -> Iterable[Any]:
+def _split_at_points(area: Any) -> Iterable[Any]:
     """Yield the polygons of an area, split where parts touch in a single point, which no ring may contain twice."""
     for polygon in list_polygons(area):
         parts = [*list_polygons(shapely.set_precision(polygon, _SAME_M))]
         yield from parts if len(parts) > 1 else [polygon]
 
 
-def _plane(n: Array) -> Array:
+def _plane_basis(n: Array) -> Array:
     """A rotation (3, 3) whose rows are two unit vectors in the plane with normal n, and n."""
     u = np.eye(3)[(int(np.abs(n).argmax()) + 1) % 3]
     u = u - (u @ n) * n
@@ -158,11 +158,11 @@ def _plane(n: Array) -> Array:
     return np.array([u, np.cross(n, u), n])
 
 
-def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
+def _make_face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
     """The face of a polygon in a plane.
 
     Args:
-        to_plane: (3, 3), as from `_plane`.
+        to_plane: (3, 3), as from `_plane_basis`.
         d: Distance of the plane from the origin along its normal.
         sign: 1 if the face looks along the normal, -1 if against it.
     """
@@ -171,12 +171,12 @@ def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: f
     return Face(name, outline, tuple(holes), fit)
 
 
-def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
+def _join_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
     """Merge cylindrical walls of equal radius, name and axis that follow each other."""
     joined: list[RoundFace] = []
     for face in rounds:
         for i, other in enumerate(joined):
-            whole = _together(other, face)
+            whole = _join_pair(other, face)
             if whole is not None:
                 joined[i] = whole
                 break
@@ -185,7 +185,7 @@ def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
     return joined
 
 
-def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
+def _join_pair(a: RoundFace, b: RoundFace) -> RoundFace | None:
     """Two consecutive walls as one; None if they are not parts of one cylinder or leave a gap."""
     if a.kind != "cylinder" or b.kind != "cylinder" or (a.hole, a.name, a.fit) != (b.hole, b.name, b.fit):
         return None
@@ -197,7 +197,7 @@ def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
         and np.linalg.norm(off - along * a.axis) < _SAME_M
         and abs(a.radius - b.radius) < _SAME_M
         and abs(a.extent_rad - b.extent_rad) < 1e-9
-        and (a.extent_rad > WHOLE_TURN - 1e-9 or bool(np.linalg.norm(_toward(a) - _toward(b)) < 1e-9))
+        and (a.extent_rad > WHOLE_TURN - 1e-9 or bool(np.linalg.norm(_mean_direction(a) - _mean_direction(b)) < 1e-9))
     )
     if not same:
         return None
@@ -208,6 +208,6 @@ def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
     return replace(a, span=(float(spans[0][0]), float(spans[1][1])))
 
 
-def _toward(face: RoundFace) -> Array:
+def _mean_direction(face: RoundFace) -> Array:
     """The direction to the middle of a partial wall, (3,); zero for a full turn."""
     return np.zeros(3) if face.toward is None else face.toward

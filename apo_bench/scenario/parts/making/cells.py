@@ -28,10 +28,10 @@ def cut_convex(area: Any) -> list[Array]:
     Triangles are joined across common sides while the result stays convex (Hertel and Mehlhorn), which gives at most
     four times the least number of rings.
     """
-    return [cell for polygon in list_polygons(area) if polygon.area > _SLIVER_MM2 for cell in _cut(polygon)]
+    return [cell for polygon in list_polygons(area) if polygon.area > _SLIVER_MM2 for cell in _triangulate(polygon)]
 
 
-def _cut(polygon: Any) -> list[Array]:
+def _triangulate(polygon: Any) -> list[Array]:
     """Cut one polygon, possibly with holes, into convex rings; the longest diagonals are removed first."""
     from manifold3d import triangulate
 
@@ -45,7 +45,7 @@ def _cut(polygon: Any) -> list[Array]:
     for a, b in sorted(diagonals, key=lambda side: -float(np.linalg.norm(points[side[0]] - points[side[1]]))):
         i = owner[a, b]
         k = owner[b, a]
-        joined = _joined(cells[i], cells[k], a, b)
+        joined = _join_at_edge(cells[i], cells[k], a, b)
         if i != k and is_convex(points[joined]):
             cells[i] = joined
             for edge in zip(joined, [*joined[1:], joined[0]], strict=True):
@@ -61,7 +61,7 @@ def _is_wide(ring: Array) -> bool:
     return bool(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > _SAME_MM * around)
 
 
-def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int]:
+def _join_at_edge(first: list[int], second: list[int], a: int, b: int) -> list[int]:
     """Join two rings of corner indices across their common side, which leads from a to b in the first ring."""
     i = first.index(b)
     k = second.index(a)
@@ -138,13 +138,13 @@ def cut_bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[A
         rings: Corners (k, 2), with the material to their left; and a mask (k,), True if the side that begins at the
             corner recedes.
     """
-    return [quad for corners, fit in rings if fit.any() for quad in _band(area, corners, fit)]
+    return [quad for corners, fit in rings if fit.any() for quad in _cut_band(area, corners, fit)]
 
 
-def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
+def _cut_band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
     """The quadrilaterals of one ring, with the largest width at which they are convex, disjoint and inside the area."""
     for width in _WIDTHS_MM:
-        inner = [_inner(corners, fit, i, width) for i in range(len(corners))]
+        inner = [_offset_inwards(corners, fit, i, width) for i in range(len(corners))]
         sides = [(int(i), (int(i) + 1) % len(corners)) for i in np.flatnonzero(fit)]
         quads = [np.array([corners[i], corners[k], inner[k][0], inner[i][1]]) for i, k in sides]
         shapes = [Polygon(quad) for quad in quads]
@@ -156,7 +156,7 @@ def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
     return []
 
 
-def _inner(corners: Array, fit: NDArray[np.bool_], i: int, width: float) -> tuple[Array, Array]:
+def _offset_inwards(corners: Array, fit: NDArray[np.bool_], i: int, width: float) -> tuple[Array, Array]:
     """The inner corners of the bands at corner i: of the side that ends there, then of the side that begins there.
 
     They are equal where both sides recede.

@@ -7,8 +7,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.scenario.parts.making.moments import Moments, frustum_moments, sum_moments
-from apo_bench.scenario.parts.making.outline import needed_sides
+from apo_bench.scenario.parts.making.moments import Moments, compute_frustum_moments, sum_moments
+from apo_bench.scenario.parts.making.outline import count_needed_sides
 
 _SAME_MM = 1e-6
 """Heights that differ by less are equal."""
@@ -42,7 +42,7 @@ class Frustum:
     @property
     def count(self) -> int:
         """Number of sides of its polygon."""
-        return needed_sides(self.sides, self.name, max(self.radii))
+        return count_needed_sides(self.sides, self.name, max(self.radii))
 
     def at(self, height: float) -> float:
         """Its radius at a height."""
@@ -55,7 +55,7 @@ class Frustum:
 
     def moments(self) -> Moments:
         """Its exact moments, [mm]."""
-        return frustum_moments(self.low, self.high, *self.radii)
+        return compute_frustum_moments(self.low, self.high, *self.radii)
 
     def wall(self, at: tuple[float, float], hole: bool) -> RoundFace:
         """Its round face, [m], about the axis along z through `at`, [mm]."""
@@ -65,7 +65,7 @@ class Frustum:
         return RoundFace(self.name, point, np.array([0.0, 0.0, 1.0]), span, (1e-3 * a, 1e-3 * b), hole, self.fit)
 
 
-def chamfer(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
+def add_chamfers(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
     """Chamfer the ends of a cylinder by 45 degrees; return its steps from low to high.
 
     The total length does not change. The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
@@ -94,17 +94,17 @@ def subtract_steps(moments: Moments, steps: Sequence[Frustum], at: tuple[float, 
     return sum_moments(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
 
 
-def raise_to(flat: Array, z: float) -> Array:
+def raise_to_height(flat: Array, z: float) -> Array:
     """Points (k, 3) above points (k, 2) of the xy plane, at height z."""
     return np.column_stack([flat, np.full(len(flat), z)])
 
 
-def prism(flat: Array, low: float, high: float) -> Array:
+def make_prism(flat: Array, low: float, high: float) -> Array:
     """The corners, (2 k, 3), of a prism over points of a plane, (k, 2)."""
-    return np.concatenate([raise_to(flat, low), raise_to(flat, high)])
+    return np.concatenate([raise_to_height(flat, low), raise_to_height(flat, high)])
 
 
-def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
+def find_steps_at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
     """Radius and number of sides just above or just below a height; (0, 0) if no step is there."""
     for step in steps:
         up = step.low - _SAME_MM <= height < step.high - _SAME_MM
@@ -114,7 +114,7 @@ def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[flo
     return 0.0, 0
 
 
-def heights_of(steps: Sequence[Frustum], *more: float) -> list[float]:
+def list_heights(steps: Sequence[Frustum], *more: float) -> list[float]:
     """All heights at which steps begin or end, and `more` heights, ascending, each once."""
     every = np.sort([*more, *(h for step in steps for h in (step.low, step.high))])
     return [float(h) for h in every[np.diff(every, prepend=-np.inf) > _SAME_MM]]

@@ -52,7 +52,7 @@ def sum_moments(first: Moments, others: Iterable[Moments], sign: float = 1.0) ->
     return reduce(lambda moments, other: moments.plus(other, sign), others, first)
 
 
-def polygon_moments(ring: Array) -> Moments:
+def compute_polygon_moments(ring: Array) -> Moments:
     """The moments of the area inside a counter-clockwise ring (k, 2)."""
     x, y = ring.T
     u, v = np.roll(ring, -1, axis=0).T
@@ -65,7 +65,7 @@ def polygon_moments(ring: Array) -> Moments:
     return Moments(float(c.sum() / 2.0), first, np.array([[xx, xy], [xy, yy]]))
 
 
-def segment_moments(center: Array, radius: float, middle: float, extent: float) -> Moments:
+def compute_segment_moments(center: Array, radius: float, middle: float, extent: float) -> Moments:
     """The moments of the circular segment between an arc and its chord.
 
     Args:
@@ -80,7 +80,7 @@ def segment_moments(center: Array, radius: float, middle: float, extent: float) 
     sector = Moments(
         a * r**2, np.array([2.0 * r**3 * s / 3.0, 0.0]), np.diag([r**4 * (a + s * c), r**4 * (a - s * c)]) / 4.0
     )
-    chord = polygon_moments(np.array([[0.0, 0.0], [r * c, -r * s], [r * c, r * s]]))
+    chord = compute_polygon_moments(np.array([[0.0, 0.0], [r * c, -r * s], [r * c, r * s]]))
     R = np.array([[np.cos(middle), -np.sin(middle)], [np.sin(middle), np.cos(middle)]])
     return sector.plus(chord, -1.0).moved(R, center)
 
@@ -97,7 +97,7 @@ def extrude_moments(flat: Moments, low: float, high: float) -> Moments:
     return Moments(h * flat.size, np.append(h * flat.first, z1 * flat.size), second)
 
 
-def frustum_moments(low: float, high: float, r_low: float, r_high: float) -> Moments:
+def compute_frustum_moments(low: float, high: float, r_low: float, r_high: float) -> Moments:
     """The moments of a cylinder or a truncated cone about the z axis, between two heights with their radii."""
     # The radius is linear in z, so the integrands are polynomials: up to degree 7 four Gauss points are exact.
     nodes, weights = np.polynomial.legendre.leggauss(4)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, count_sides
-from apo_bench.scenario.parts.making.moments import Moments, polygon_moments, segment_moments
+from apo_bench.scenario.parts.making.moments import Moments, compute_polygon_moments, compute_segment_moments
 
 COARSE_SIDES = 12
 """Sides of a full circle for a round wall without a name, which no contact uses."""
@@ -128,12 +128,12 @@ def round_corners(outline: Outline, radius: float, sides: int | None = None) -> 
         a = points[i] - back * into
         b = points[i] + back * out
         center = a + np.sign(turn) * radius * np.array([-into[1], into[0]])
-        edges.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0, sides=sides))
-        edges.append(replace(edge, start=_pair(b)))
+        edges.append(Edge(_read_pair(a), center=_read_pair(center), clockwise=turn < 0.0, sides=sides))
+        edges.append(replace(edge, start=_read_pair(b)))
     return edges
 
 
-def arc_of(outline: Outline, i: int) -> OutlineArc | None:
+def find_arc(outline: Outline, i: int) -> OutlineArc | None:
     """The arc of side i; None if the side is straight. Ends at different distances raise a `ValueError`."""
     edge = outline[i]
     after = outline[(i + 1) % len(outline)]
@@ -158,27 +158,29 @@ def trace_outline(outline: Outline, hole: bool = False) -> Array:
     Args:
         hole: True if the outline is that of a hole.
     """
-    return np.array([corner for i in range(len(outline)) for corner in _corners(outline, i, hole)])
+    return np.array([corner for i in range(len(outline)) for corner in _list_corners(outline, i, hole)])
 
 
-def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
+def find_receding_edges(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
     """(k,), True for each side of the polygon of `trace_outline` that recedes by the clearance."""
-    return np.array([edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)], dtype=np.bool_)
+    return np.array(
+        [edge.fit for i, edge in enumerate(outline) for _ in _list_corners(outline, i, hole)], dtype=np.bool_
+    )
 
 
-def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
+def _list_corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
     """Yield the corners (2,) of the polygon of side i, without its end."""
     edge = outline[i]
-    arc = arc_of(outline, i)
+    arc = find_arc(outline, i)
     start = np.array(edge.start, dtype=np.float64)
     if arc is None:
         yield start
         return
     share = abs(arc.turn) / (2.0 * np.pi)
-    n = max(2, int(np.ceil(share * needed_sides(edge.sides, edge.name, arc.radius) - 1e-9)))
+    n = max(2, int(np.ceil(share * count_needed_sides(edge.sides, edge.name, arc.radius) - 1e-9)))
     if hole != edge.clockwise:  # bulges into the material
         step = arc.turn / n
-        if not goes_on(arc_of(outline, i - 1), arc):
+        if not continues_arc(find_arc(outline, i - 1), arc):
             yield start
         k = np.arange(n) + 0.5
         yield from arc.at(arc.first + step * k, arc.radius / np.cos(step / 2.0))
@@ -186,7 +188,7 @@ def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
         yield from arc.at(arc.first + arc.turn * np.arange(n) / n)
 
 
-def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
+def continues_arc(before: OutlineArc | None, arc: OutlineArc) -> bool:
     """True if an arc continues the one before on the same circle, in the same direction."""
     return (
         before is not None
@@ -196,22 +198,22 @@ def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
     )
 
 
-def needed_sides(stated: int | None, name: str, radius_mm: float) -> int:
+def count_needed_sides(stated: int | None, name: str, radius_mm: float) -> int:
     """Sides of the polygon of a full circle: as stated, else as a contact needs if it has a name, else few."""
     return stated or (count_sides(1e-3 * radius_mm) if name else COARSE_SIDES)
 
 
-def outline_moments(outline: Outline) -> Moments:
+def compute_outline_moments(outline: Outline) -> Moments:
     """The moments of the exact area inside an outline, arcs included, [mm]."""
-    moments = polygon_moments(np.array([edge.start for edge in outline], dtype=np.float64))
+    moments = compute_polygon_moments(np.array([edge.start for edge in outline], dtype=np.float64))
     for i in range(len(outline)):
-        arc = arc_of(outline, i)
+        arc = find_arc(outline, i)
         if arc is not None:
-            segment = segment_moments(arc.center, arc.radius, arc.middle, abs(arc.turn))
+            segment = compute_segment_moments(arc.center, arc.radius, arc.middle, abs(arc.turn))
             moments = moments.plus(segment, float(np.sign(arc.turn)))
     return moments
 
 
-def _pair(point: Array) -> tuple[float, float]:
+def _read_pair(point: Array) -> tuple[float, float]:
     """An array (2,) as a tuple of floats."""
     return float(point[0]), float(point[1])

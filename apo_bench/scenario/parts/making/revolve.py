@@ -13,12 +13,12 @@ from apo_bench.scenario.parts.making.cells import clip, cut_wedges
 from apo_bench.scenario.parts.making.extrude import flat_face
 from apo_bench.scenario.parts.making.frustums import (
     Frustum,
-    at_height,
-    chamfer,
+    add_chamfers,
     circumscribe_polygon,
-    heights_of,
+    find_steps_at_height,
     inscribe_polygon,
-    raise_to,
+    list_heights,
+    raise_to_height,
     subtract_steps,
 )
 from apo_bench.scenario.parts.making.moments import sum_moments
@@ -46,13 +46,13 @@ def revolve(
         inner: Steps of its bore, inside the outer wall.
         flats: Height -> name of the flat face there: ends, shoulders, the bottom of a blind bore.
     """
-    heights = heights_of((*outer, *inner))
+    heights = list_heights((*outer, *inner))
     moments = sum_moments(outer[0].moments(), (step.moments() for step in outer[1:]))
-    pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
+    pieces = [p for a, b in pairwise(heights) for p in _revolve_step(outer, inner, a, b)]
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(
         tuple(pieces),
-        tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""))),
+        tuple(face for z in heights for face in _make_flat_rings(outer, inner, z, (flats or {}).get(z, ""))),
         tuple(rounds),
         subtract_steps(moments, inner).in_metres,
     )
@@ -81,11 +81,11 @@ def make_shaft(
         bottom: Name of the lower face; "": named later.
         top: Name of the upper face; "": named later.
     """
-    steps = chamfer(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
+    steps = add_chamfers(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
     return revolve(steps, flats={low: bottom, high: top})
 
 
-def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
+def _revolve_step(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
     """The pieces between heights a and b, between which no step begins or ends."""
     around = next((s for s in outer if s.covers(a, b)), None)
     bore = next((s for s in inner if s.covers(a, b)), None)
@@ -97,7 +97,11 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
         center = np.array([0.0, 0.0, 5e-4 * (a + b)])
         yield make_cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, 5e-4 * (b - a)))
     elif bore is None:
-        yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
+        yield Hull(
+            "",
+            1e-3
+            * np.concatenate([_list_ring_corners(low, around.count, a), _list_ring_corners(high, around.count, b)]),
+        )
     else:
         n = max(around.count, bore.count)
         # Wedges of the lower and the upper polygon of the outer wall, cut off where the bore begins.
@@ -105,23 +109,23 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
             *[cut_wedges(inscribe_polygon((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
         ):
             ends = [(clip(first, -u, -bore.at(a)), a), (clip(last, -u, -bore.at(b)), b)]
-            yield Hull("", 1e-3 * np.concatenate([raise_to(*end) for end in ends]))
+            yield Hull("", 1e-3 * np.concatenate([raise_to_height(*end) for end in ends]))
 
 
-def _ring(radius: float, sides: int, z: float) -> Array:
+def _list_ring_corners(radius: float, sides: int, z: float) -> Array:
     """The corners (k, 3) of a horizontal polygon on a circle; one point (1, 3) if the radius is 0."""
     if radius < _SAME_MM:
         return np.array([[0.0, 0.0, z]])
-    return raise_to(inscribe_polygon((0.0, 0.0), radius, sides), z)
+    return raise_to_height(inscribe_polygon((0.0, 0.0), radius, sides), z)
 
 
-def _flats(outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str) -> Iterator[Face]:
+def _make_flat_rings(outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str) -> Iterator[Face]:
     """The horizontal faces at height z: solid below and free above (looks up), or the reverse (looks down)."""
     areas = []
     for above in (False, True):
         # R, n: radius and sides of the outer wall; r, k: those of the bore; both get the larger number of sides.
-        R, n = at_height(outer, z, above)
-        r, k = at_height(inner, z, above)
+        R, n = find_steps_at_height(outer, z, above)
+        r, k = find_steps_at_height(inner, z, above)
         n, k = (max(n, k), max(n, k)) if n and k else (n, k)
         disc = Polygon(inscribe_polygon((0.0, 0.0), R, n)) if R else Polygon()
         areas.append(disc.difference(Polygon(circumscribe_polygon((0.0, 0.0), r, k))) if r else disc)

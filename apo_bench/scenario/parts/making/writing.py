@@ -30,12 +30,12 @@ def build_solid(name: str, body: Body) -> Solid:
     named = [face.name for faces in (body.flats, body.rounds) for face in faces if face.name]
     if len(set(named)) < len(named):
         raise ValueError(f"part '{name}' has faces with one name; each needs its own: {', '.join(sorted(named))}")
-    flats = _called(sorted(body.flats, key=_place))
-    rounds = _called(body.rounds)
+    flats = _name_faces(sorted(body.flats, key=_name_by_position))
+    rounds = _name_faces(body.rounds)
     return Solid(
         name=name,
         faces={face.name: face for face in flats},
-        pieces=tuple(_piece(f"p{i}", piece) for i, piece in enumerate(body.pieces, start=1)),
+        pieces=tuple(_name_piece(f"p{i}", piece) for i, piece in enumerate(body.pieces, start=1)),
         centroid=body.moments.centroid,
         volume=body.moments.size,
         rounds={face.name: face for face in rounds},
@@ -46,25 +46,25 @@ def build_solid(name: str, body: Body) -> Solid:
 _Some = TypeVar("_Some", Face, RoundFace)
 
 
-def _called(faces: Iterable[_Some]) -> list[_Some]:
+def _name_faces(faces: Iterable[_Some]) -> list[_Some]:
     """Name the faces without a name `auto_KIND_NUMBER`, numbered among all faces of their kind; these come last."""
     counts: dict[str, int] = {}
     named = []
     for face in faces:
-        stem = _stem(face)
+        stem = _name_stem(face)
         counts[stem] = counts.get(stem, 0) + 1
         named.append(face if face.name else replace(face, name=f"auto_{stem}_{counts[stem]}"))
     return sorted(named, key=lambda face: face.name.startswith("auto_"))
 
 
-def _place(face: Face) -> tuple[float, ...]:
+def _name_by_position(face: Face) -> tuple[float, ...]:
     """Sort key of a flat face: its height along its main axis, then its lowest coordinates along the next axes."""
     axis = int(np.abs(face.normal).argmax())
     low = face.outline.min(axis=0)
     return tuple(round(float(low[i % 3]), 9) for i in (axis, axis + 1, axis + 2))
 
 
-def _stem(face: Face | RoundFace) -> str:
+def _name_stem(face: Face | RoundFace) -> str:
     """The kind of a face in automatic names, such as `bore`, `flat`, or `px` for a face that looks along +x."""
     if isinstance(face, RoundFace):
         return {"cylinder": "bore" if face.hole else "shaft", "cone": "cone", "rim": "rim"}[face.kind]
@@ -74,7 +74,7 @@ def _stem(face: Face | RoundFace) -> str:
     return ("p" if face.normal[axis] > 0.0 else "n") + "xyz"[axis]
 
 
-def _piece(name: str, hull: Hull) -> Piece:
+def _name_piece(name: str, hull: Hull) -> Piece:
     """The named piece, as a `Box` if the hull is an axis-aligned box."""
     if hull.cylinder is None and len(hull.corners) == 8 and hull.half.min() >= THINNEST_M:
         box = Box(name, hull.center, hull.half)
@@ -112,18 +112,20 @@ def write_part(
     solid = build_solid(name, body)
     path = folder / f"{name}.xml"
     boxes = all_boxes(solid.pieces)
-    matter = {"density": f"{density:g}", "friction": _words(friction)} if boxes else {}
-    root = _tree(solid, {**matter, "rgba": _words((*color, 1.0))})
+    matter = {"density": f"{density:g}", "friction": _join_numbers(friction)} if boxes else {}
+    root = _build_tree(solid, {**matter, "rgba": _join_numbers((*color, 1.0))})
     origin = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
     note = f"<!-- {origin} -->\n" if boxes else ""
     indent(root)
     write_file(path, note + tostring(root, encoding="unicode") + "\n")
     if not boxes:
-        write_file(path.with_suffix(".toml"), stated_text(solid, density, friction, source, licence, title))
+        write_file(
+            path.with_suffix(".toml"), format_stated_properties(solid, density, friction, source, licence, title)
+        )
     return path
 
 
-def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
+def _build_tree(solid: Solid, attributes: dict[str, Any]) -> Element:
     """The MJCF document of a part; `attributes` are those of its default geom."""
     root = Element("mujoco", model=solid.name)
     default = SubElement(root, "default")
@@ -136,29 +138,34 @@ def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
     if meshes:
         asset = SubElement(root, "asset")
         for mesh in meshes:
-            SubElement(asset, "mesh", name=mesh.name, vertex=_words(mesh.corners.ravel()))
+            SubElement(asset, "mesh", name=mesh.name, vertex=_join_numbers(mesh.corners.ravel()))
     body = SubElement(SubElement(root, "worldbody"), "body", name=solid.name)
     for piece in solid.pieces:
-        SubElement(body, "geom", name=piece.name, **_geom(piece))
+        SubElement(body, "geom", name=piece.name, **_write_geom(piece))
     if all_boxes(solid.pieces):
         for face in solid.faces.values():
             fit = {"class": "fit"} if face.fit else {}
             if not face.name.startswith("auto_"):
-                SubElement(body, "site", {"name": face.name, **fit, "pos": _words(_inside(face))})
+                SubElement(body, "site", {"name": face.name, **fit, "pos": _join_numbers(_find_point_inside(face))})
     return root
 
 
-def _geom(piece: Piece) -> dict[str, Any]:
+def _write_geom(piece: Piece) -> dict[str, Any]:
     """The attributes of the geom of a piece."""
     if isinstance(piece, Box):
-        return {"type": "box", "pos": _words(piece.center), "size": _words(piece.half)}
+        return {"type": "box", "pos": _join_numbers(piece.center), "size": _join_numbers(piece.half)}
     if piece.cylinder is None:
         return {"type": "mesh", "mesh": piece.name}
     center, axis, radius, half = piece.cylinder
-    return {"type": "cylinder", "pos": _words(center), "zaxis": _words(axis), "size": _words((radius, half))}
+    return {
+        "type": "cylinder",
+        "pos": _join_numbers(center),
+        "zaxis": _join_numbers(axis),
+        "size": _join_numbers((radius, half)),
+    }
 
 
-def _inside(face: Face) -> Array:
+def _find_point_inside(face: Face) -> Array:
     """A point (3,) inside an axis-aligned face, away from its edges, [m]."""
     axis = int(np.abs(face.normal).argmax())
     plane = [(axis + 1) % 3, (axis + 2) % 3]
@@ -168,7 +175,7 @@ def _inside(face: Face) -> Array:
     return inside
 
 
-def stated_text(
+def format_stated_properties(
     solid: Solid, density: float, friction: Sequence[float], source: str, licence: str, title: str = ""
 ) -> str:
     """Return the text of `NAME.toml`: faces, volume, centroid, inertia and material of a part."""
@@ -183,7 +190,7 @@ def stated_text(
         "density": float(density),
         "friction": list(map(float, friction)),
         "volume_mm3": float(f"{1e9 * solid.volume:.12g}"),
-        "centroid_mm": _list(1e3 * solid.centroid),
+        "centroid_mm": _write_list(1e3 * solid.centroid),
         "inertia_mm5": [float(f"{x:.12g}") for x in six],
         "faces": {face.name: _plane_table(face) for face in solid.faces.values()}
         | {wall.name: _round_table(wall) for wall in solid.rounds.values()},
@@ -193,36 +200,40 @@ def stated_text(
 
 def _plane_table(face: Face) -> dict[str, Any]:
     """The entry of a flat face in the TOML file."""
-    table = {"kind": "plane", "outline_mm": _list(1e3 * face.outline)}
-    holes = {"holes_mm": [_list(1e3 * hole) for hole in face.holes]} if face.holes else {}
+    table = {"kind": "plane", "outline_mm": _write_list(1e3 * face.outline)}
+    holes = {"holes_mm": [_write_list(1e3 * hole) for hole in face.holes]} if face.holes else {}
     return table | holes | {"fit": face.fit}
 
 
 def _round_table(wall: RoundFace) -> dict[str, Any]:
     """The entry of a round face in the TOML file."""
-    table: dict[str, Any] = {"kind": wall.kind, "at_mm": _list(1e3 * wall.point), "axis": _list(wall.axis, 12)}
+    table: dict[str, Any] = {
+        "kind": wall.kind,
+        "at_mm": _write_list(1e3 * wall.point),
+        "axis": _write_list(wall.axis, 12),
+    }
     table["hole"] = wall.hole
     if wall.kind == "cone":
-        table["radii_mm"] = _list(1e3 * np.array(wall.radii))
+        table["radii_mm"] = _write_list(1e3 * np.array(wall.radii))
     else:
         table["radius_mm"] = round(1e3 * wall.radius, 9)
     if wall.kind != "rim":
-        table |= {"span_mm": _list(1e3 * np.array(wall.span)), "fit": wall.fit}
+        table |= {"span_mm": _write_list(1e3 * np.array(wall.span)), "fit": wall.fit}
     if wall.toward is not None and wall.extent_rad < WHOLE_TURN:
-        table |= {"extent_deg": round(float(np.degrees(wall.extent_rad)), 9), "toward": _list(wall.toward, 12)}
+        table |= {"extent_deg": round(float(np.degrees(wall.extent_rad)), 9), "toward": _write_list(wall.toward, 12)}
     return table
 
 
-def _list(values: Array, digits: int = 9) -> Any:
+def _write_list(values: Array, digits: int = 9) -> Any:
     """Return rounded numbers as nested lists; adding 0.0 turns -0.0 into 0.0."""
     return np.vectorize(lambda x: round(float(x), digits) + 0.0, otypes=[float])(values).tolist()
 
 
-def _words(values: Iterable[float]) -> str:
+def _join_numbers(values: Iterable[float]) -> str:
     """Numbers as the text of an XML attribute."""
-    return " ".join(_number(x, 12) for x in values)
+    return " ".join(_write_number(x, 12) for x in values)
 
 
-def _number(x: float, digits: int) -> str:
+def _write_number(x: float, digits: int) -> str:
     text = f"{x:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text

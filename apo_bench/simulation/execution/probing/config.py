@@ -10,8 +10,8 @@ from apo_bench.records import USUAL_FT_SENSOR
 PROBING_ACTIONS = ("square", "touch", "lay", "search")
 """All probing actions.
 
-`square`: square parts before the pick. `touch`: touch fixed parts with the hand. `lay`: lay parts flat before their
-insertion; from above, they then also touch a wall. `search`: search for the hole if an insertion is stopped.
+`square`: square parts before the pick. `touch`: touch fixed parts with the hand. `lay`: lay parts flat before
+their insertion; from above, they then also touch a wall. `search`: search for the hole if an insertion is stopped.
 """
 
 
