@@ -8,39 +8,41 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import Array
+from benchmarks.held_out import CONTACTS
 from benchmarks.predicted_success_trials import CALIBRATION, HELD_OUT, Line
 from benchmarks.rates_by_condition import table
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "results" / "predicted-success.md"
-PICTURE = ROOT / "docs" / "pictures" / "predicted_success.png"
+PICTURE = ROOT / "docs" / "pictures" / "predicted_success.svg"
 FIRST = "<!-- predicted success -->"
 LAST = "<!-- end of predicted success -->"
 BINS = 10
+WRONG = ("false-", *CONTACTS)  # in the names of conditions with wrong contacts
 LEAST = (0.0, 0.5, 0.8, 0.9, 0.95)  # of `--min-predicted-success`
 
 
-def write_page(lines: Sequence[Line], scores: Array, rates: Array) -> None:
+def write_page(lines: Sequence[Line]) -> None:
     """Write numbers and picture of the held-out trials.
 
     Args:
         lines: All trials.
-        scores: The table: rising scores.
-        rates: The table: success rates of plans with these scores.
     """
     held = [line for line in lines if line["set"] == HELD_OUT]
-    planned = [line for line in held if line["score"]]
-    predicted = np.interp([float(line["score"]) for line in planned], scores, rates)
+    planned = [line for line in held if line["predicted"]]
+    predicted = np.array([float(line["predicted"]) for line in planned])
     right = np.array([float(line["success"]) for line in planned])
-    calibration = [line for line in lines if line["set"] == CALIBRATION and line["score"]]
-    assemblies, scenarios = (len({line["scenario"] for line in some}) for some in (calibration, planned))
+    generated = [line for line in lines if line["set"] == CALIBRATION and line["predicted"]]
+    beside = np.array([float(line["predicted"]) for line in generated])
+    error = calibration_error(beside, np.array([float(line["success"]) for line in generated]))
     text = "\n".join(
         [
             FIRST,
             "",
-            f"The calibration has {len(calibration):,} plans of {assemblies} generated assemblies, the test "
-            f"{len(planned):,} plans of {scenarios} scenarios of the benchmark, of which {int(right.sum()):,} "
-            f"succeeded. {len(held) - len(planned)} further trials had no plan.",
+            f"The test has {len(planned):,} plans of {len({line['scenario'] for line in planned})} scenarios in "
+            f"{len({line['condition'] for line in planned})} conditions. {int(right.sum()):,} of them succeeded. "
+            f"{len(held) - len(planned)} further trials had no plan. Over {len(generated):,} plans of generated "
+            f"assemblies the calibration error is {error:.3f}.",
             "",
             *table(("measure", "value"), measures(planned, predicted, right)),
             "",
@@ -50,7 +52,7 @@ def write_page(lines: Sequence[Line], scores: Array, rates: Array) -> None:
             ),
             "",
             *table(
-                ("method", "noise", "mm, deg", "robot error", "plans", "succeeded", "predicted", "AUC"),
+                ("condition", "plans", "succeeded", "predicted", "ECE", "AUC", "Brier", "of the base rate"),
                 conditions(planned, predicted, right),
             ),
             "",
@@ -63,29 +65,17 @@ def write_page(lines: Sequence[Line], scores: Array, rates: Array) -> None:
     print(f"Wrote {PAGE} and {PICTURE}")
 
 
-def condition_of(line: Line) -> tuple[str, ...]:
-    """Return method, noise and robot error of a trial."""
-    return line["method"], line["noise"], line["noise_mm"], line["robot_error"]
-
-
 def measures(planned: Sequence[Line], predicted: Array, right: Array) -> list[tuple[str, str]]:
     """Return each measure of the prediction, and its value."""
-    order = np.argsort(predicted, kind="stable")
-    failures = int((1.0 - right).sum())
-    caught = float((1.0 - right)[order[:failures]].sum()) / max(1, failures)
-    found = [
+    wrong = np.array([any(kind in line["condition"] for kind in WRONG) for line in planned])
+    whole = [line["condition"] for line in planned]
+    return [
         ("calibration error (ECE) in ten bins", f"{calibration_error(predicted, right):.3f}"),
         ("Brier score", f"{np.mean((predicted - right) ** 2):.3f}"),
-        ("AUC over all", f"{auc_within([()] * len(planned), predicted, right):.2f}"),
-        (f"of {failures} failures, among the {failures} lowest predictions", f"{100 * caught:.0f} %"),
+        ("AUC over all", f"{auc_within([''] * len(planned), predicted, right):.2f}"),
+        ("AUC under wrong contacts", f"{auc_within([''] * int(wrong.sum()), predicted[wrong], right[wrong]):.2f}"),
+        ("Brier skill over the base rate of condition", f"{100 * skill(whole, predicted, right):.0f} %"),
     ]
-    for name, groups in (
-        ("condition", [condition_of(line) for line in planned]),
-        ("scenario and condition", [(line["scenario"], *condition_of(line)) for line in planned]),
-    ):
-        found.append((f"Brier skill over the base rate of {name}", f"{100 * skill(groups, predicted, right):.0f} %"))
-        found.append((f"AUC within {name}", f"{auc_within(groups, predicted, right):.2f}"))
-    return found
 
 
 def abstain(least: float, predicted: Array, right: Array) -> tuple[str, ...]:
@@ -97,15 +87,17 @@ def abstain(least: float, predicted: Array, right: Array) -> tuple[str, ...]:
 
 
 def conditions(planned: Sequence[Line], predicted: Array, right: Array) -> list[tuple[object, ...]]:
-    """Return success rate and mean prediction of every condition."""
-    groups = [condition_of(line) for line in planned]
+    """Return the measures of every condition."""
+    names = [line["condition"] for line in planned]
     lines = list[tuple[object, ...]]()
-    for method, noise, noise_mm, error in dict.fromkeys(groups):
-        own = np.array([group == (method, noise, noise_mm, error) for group in groups])
-        auc = auc_within([()] * int(own.sum()), predicted[own], right[own])
-        rates = (f"{100 * right[own].mean():.0f} %", f"{100 * predicted[own].mean():.0f} %")
-        place = (f"`{method}`", noise.removeprefix("benchmarks/"), noise_mm, error)
-        lines.append((*place, own.sum(), *rates, "" if np.isnan(auc) else f"{auc:.2f}"))
+    for name in dict.fromkeys(names):
+        own = np.array([each == name for each in names])
+        p, y = predicted[own], right[own]
+        auc = auc_within([""] * len(p), p, y)
+        rates = (f"{100 * y.mean():.0f} %", f"{100 * p.mean():.0f} %", f"{calibration_error(p, y):.3f}")
+        base = y.mean() * (1.0 - y.mean())
+        brier = (f"{np.mean((p - y) ** 2):.3f}", f"{base:.3f}")
+        lines.append((name, own.sum(), *rates, "" if np.isnan(auc) else f"{auc:.2f}", *brier))
     return lines
 
 
@@ -120,7 +112,7 @@ def calibration_error(predicted: Array, right: Array) -> float:
     return float(sum(abs(right[own].sum() - predicted[own].sum()) for own in bins_of(predicted)) / len(right))
 
 
-def skill(groups: Sequence[tuple[str, ...]], predicted: Array, right: Array) -> float:
+def skill(groups: Sequence[str], predicted: Array, right: Array) -> float:
     """Return by what share the Brier score is smaller than that of the rate of the other trials of the group."""
     base = np.empty(len(right))
     for key in set(groups):
@@ -131,7 +123,7 @@ def skill(groups: Sequence[tuple[str, ...]], predicted: Array, right: Array) -> 
     return 1.0 - float(np.mean((predicted - right) ** 2) / np.mean((base - right) ** 2))
 
 
-def auc_within(groups: Sequence[tuple[str, ...]], predicted: Array, right: Array) -> float:
+def auc_within(groups: Sequence[str], predicted: Array, right: Array) -> float:
     """Return how often a success has a higher prediction than a failure of the same group; half where equal."""
     better = pairs = 0.0
     for key in set(groups):
@@ -145,7 +137,10 @@ def auc_within(groups: Sequence[tuple[str, ...]], predicted: Array, right: Array
 
 def draw(predicted: Array, right: Array) -> None:
     """Draw a reliability diagram, and failures over the share of plans that are executed."""
+    import matplotlib as mpl
     from matplotlib.figure import Figure
+
+    mpl.rcParams["svg.hashsalt"] = "predicted success"
 
     figure = Figure(figsize=(9, 4), layout="constrained")
     reliability, risk = figure.subplots(1, 2)
@@ -174,4 +169,4 @@ def draw(predicted: Array, right: Array) -> None:
     risk.set(xlabel="share of plans executed", ylabel="wrong when executed", xlim=(0, 1), title="Risk over coverage")
     risk.set_ylim(bottom=0.0)
     risk.legend(frameon=False)
-    figure.savefig(PICTURE, dpi=110, metadata={"Software": None})
+    figure.savefig(PICTURE, metadata={"Date": None, "Creator": None})

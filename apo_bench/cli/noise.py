@@ -73,8 +73,11 @@ def noise_show(
 def noise_fit(
     estimates: Annotated[Path, make_path_option("Poses of an estimator: a results file of the BOP format, .csv.")],
     truth: Annotated[
-        Path, make_path_option("True poses: .csv of that format, a scene_gt.json, or a folder of scenes.")
+        Path, make_path_option("True poses: .csv of that format, a scene_gt.json, a scene, or a folder of scenes.")
     ],
+    models: Annotated[
+        Path | None, make_path_option("Symmetries of the objects: models_info.json; default: that of the dataset.")
+    ] = None,
     scene_id: Annotated[int | None, typer.Option(help="Read this scene alone; scene_gt.json names none.")] = None,
     out: Annotated[Path | None, make_path_option("Write the noise file for --noise: .toml.")] = None,
     residuals: Annotated[Path | None, make_path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
@@ -89,6 +92,7 @@ def noise_fit(
       apo-bench noise fit --estimates results.csv --truth test --residuals mine.csv --picture fit.png
     """
     from apo_bench.formats.bop import read_results
+    from apo_bench.formats.bop_models import find_models_info, read_symmetries
     from apo_bench.formats.bop_truth import read_truth
     from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit, fit_noise
     from apo_bench.perception.observation.models.empirical import format_residuals
@@ -97,12 +101,14 @@ def noise_fit(
     from apo_bench.viz.fit_picture import draw_fit
     from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
 
-    inputs = (estimates, truth)
+    inputs = (estimates, truth) if models is None else (estimates, truth, models)
     check_output(out, "--out", ".toml", inputs=inputs)
     check_output(residuals, "--residuals", ".csv", inputs=inputs)
     check_output(picture, "--picture", ".png", inputs=inputs)
     results = read_results(estimates)
-    matched = match_residuals(results, read_truth(truth, results, scene_id))
+    known = models or find_models_info(truth)
+    symmetries = None if known is None else read_symmetries(known)
+    matched = match_residuals(results, read_truth(truth, results, scene_id), symmetries)
     fitted = fit_noise(matched, _one_line(source or f"{estimates.name} against {truth.name}"))
     form = fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:

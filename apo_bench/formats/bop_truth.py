@@ -12,8 +12,9 @@ from apo_bench.errors import InputError, require
 from apo_bench.formats.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
 from apo_bench.io import convert_typed, read_typed
 
-LARGEST_TRUTH_BYTES = 64_000_000
-"""A scene of a video in BOP format takes up to about 20 MB."""
+LARGEST_TRUTH_BYTES = 4_000_000_000
+"""A scene of a video in BOP format takes up to about 20 MB; joined scenes take more."""
+_SCENE = "scene_gt.json"  # name of the truth of a scene in its folder
 _Number = Annotated[float, Meta(ge=-LARGEST_MM, le=LARGEST_MM)]
 _Three = tuple[_Number, _Number, _Number]
 # A rotation matrix, row by row.
@@ -33,7 +34,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
 
     A `.json` file holds one scene without naming it: `scene`, else the number of its folder, else the only estimated
     scene. It holds all images of the scene; images without any estimate are left out, as they were probably not
-    requested. A folder holds scenes as `000001/scene_gt.json`. All rows of a `.csv` file count.
+    requested. A folder is a scene, or holds scenes as `000001/scene_gt.json`. All rows of a `.csv` file count.
 
     Args:
         scene: The only scene to compare; None: all.
@@ -43,6 +44,8 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
     """
     path = Path(path)
     is_results = path.suffix.lower() == ".csv"
+    if path.is_dir() and (path / _SCENE).is_file():
+        path = path / _SCENE
     if path.is_dir():
         truth = _read_folder(path, scene)
     elif is_results:

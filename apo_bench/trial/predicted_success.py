@@ -3,8 +3,8 @@
 Every explanation that a corrector kept states possible true poses. Truths are drawn from the explanations, in
 proportion to their weights, along directions that contacts leave free. Robots are drawn from the stated robot errors.
 Each draw measures how far the plan is from failing: whether the placed parts fit (the measures of `prediction`), and
-whether faces overlap as the judge requires if that draw is the truth. The mean over the draws is the *score*. A table
-of other assemblies gives the share of plans with such a score that succeeded.
+whether faces overlap as the judge requires if that draw is the truth. Contacts may be wrong too (`contact_errors`), as
+often as their source states.
 
 The simulator only provides the scene, the reach of its arm, and the poses to which a robot with errors brings parts.
 """
@@ -12,7 +12,7 @@ The simulator only provides the scene, the reach of its arm, and the poses to wh
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, compute_placements
+from apo_bench.assembly import Assembly, Contact, Correction, Observation, Outcome, Plan, Poses, compute_placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.finished_assembly import compute_least_overlaps
@@ -31,10 +31,19 @@ from apo_bench.planning.prediction.plan_measures import (
     measure_drawn_plans,
     measure_plan,
 )
-from apo_bench.records import NO_ROBOT_ERROR, describe_outcome, parse_robot_error
+from apo_bench.records import GIVEN, NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.trial.contact_errors import (
+    ContactError,
+    ContactEvidence,
+    ContactRates,
+    Judged,
+    gross_errors,
+    missing_contacts,
+    rates_of,
+    share_within,
+)
 from apo_bench.trial.free_directions import FreeSpace, free_space
-from apo_bench.trial.predicted_success_table import RATES, SCORES
 
 if TYPE_CHECKING:
     from apo_bench.simulation.scene.scene import Scene
@@ -45,8 +54,28 @@ ROBOTS = 16
 """Draws of the robot's errors, if any are stated."""
 _STREAM = 2_030
 """Seed of the draws, the same for every plan; no trial uses it."""
-_SLACK_MM = 0.05
+SLACK_MM = 0.05
 """Standard deviation of effects that the measures neglect: sag, rest, compliance."""
+SIDE_MM = 0.03
+"""The same for faces onto which a part slides: contact stops the slide."""
+NEGLECTED = 0.5
+"""Share of the stated errors of a robot that its draws neglect: slips and friction while it places a part."""
+_LEVERS_MM = (100.0, 800.0, 50.0)
+"""Lever arms at which angles of robot errors count: of the base, of the joints, of a part in the hand."""
+TEMPERATURE = 1.0
+"""Weights of errors of contacts are likelihoods to the power of 1 / temperature."""
+_LEAST = 0.01
+"""Predictions are at least this far from 0 and 1."""
+_OUTLIER = 0.03
+"""Prior probability of an operation that was observed as wrongly as an explanation assumes."""
+_RARELY = 0.005
+"""Missing contacts with a smaller prior probability are ignored, unless a part would fall without."""
+_IMPOSSIBLE = 7.0
+"""Errors with a log weight so much smaller than the largest are ignored."""
+_FALLEN = 0.05
+"""Prior probability that a part stands as it should not be able to, in units of `ContactError.log_weight`."""
+_SAME = 1e-6
+"""Relative difference of covariances, or difference of poses, up to which they are the same."""
 _SLACK_SHARE = 0.1
 """The same for an overlap, as a share of the face."""
 _FARTHEST_M = 0.02
@@ -105,6 +134,7 @@ def predict_success(
     robot_error: str = NO_ROBOT_ERROR,
     spiral: bool = False,
     probing: bool = False,
+    contact_source: str = GIVEN,
 ) -> float:
     """The probability that a plan succeeds; the result is deterministic.
 
@@ -116,10 +146,34 @@ def predict_success(
         robot_error: The stated errors of the robot, as in records; ignored for a scenario.
         spiral: The robot searches for a hole in a spiral if an insertion is stopped.
         probing: The robot probes first and compensates its errors; only the slip of parts in its hand remains.
+        contact_source: Where the contacts come from, as in records; it states how often they are wrong.
     """
+    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, spiral, probing)
+    if any(move.refused is not None for move in arm):
+        return _LEAST
+    slack_mm = math.hypot(SLACK_MM, NEGLECTED * _stated_mm(robot_error, probing)) if ends else SLACK_MM
+    shares = _Shares(plan, where, arm, ends, slack_mm)
     explained = explanations(correction, believed, plan.target_poses)
-    score = plan_score(plan, explained, where, robot_error, spiral, probing)
-    return float(np.interp(score, SCORES, RATES))
+    rng = np.random.default_rng(_STREAM)
+    spaces = [_free_space(each) for each in explained]
+    right = list[float]()
+    for each, space in zip(explained, spaces, strict=True):
+        kept = _without(plan.assembly, each.dropped)
+        truths = draw_truths(each, space, max(1, round(TRUTHS * each.weight)), rng)
+        right.append(each.weight * shares.fit(kept) * shares.cover(kept, truths))
+    if correction is None or correction.test is None or not believed.observed.all():
+        return _bounded(sum(right))
+    if correction.hypotheses and contact_source == GIVEN:
+        # The corrector has weighed wrong contacts itself, at the rate that it assumes.
+        return _bounded(sum(right))
+    rates = rates_of(contact_source)
+    found = list(zip(explained, spaces, right, strict=True))
+    return _bounded(_with_contact_errors(shares, believed, correction, found, rates))
+
+
+def _bounded(share: float) -> float:
+    """The share, but nothing is certain."""
+    return min(max(share, _LEAST), 1.0 - _LEAST)
 
 
 def abstain(predicted_success: float, least: float) -> Outcome:
@@ -130,33 +184,100 @@ def abstain(predicted_success: float, least: float) -> Outcome:
     return Outcome("predicted-success", "abstained", None, describe_outcome("abstained") + why)
 
 
-def plan_score(
-    plan: Plan,
-    explained: Sequence[PossibleTruth],
-    where: Scene | Scenario,
-    robot_error: str = NO_ROBOT_ERROR,
-    spiral: bool = False,
-    probing: bool = False,
+def _with_contact_errors(
+    shares: _Shares,
+    believed: Observation,
+    correction: Correction,
+    explained: Sequence[tuple[PossibleTruth, FreeSpace | None, float]],
+    rates: ContactRates,
 ) -> float:
-    """The score of a plan, from 0 to 1, which the table turns into a probability.
+    """The score of a plan whose contacts may be wrong: the mean over no error and each error, by their posterior.
+
+    Explanations that drop contacts are replaced by the errors of these contacts.
 
     Args:
-        plan: With the contacts that the planner was given.
-        where, robot_error, spiral, probing: As in `predict_success`.
+        explained: Each explanation, what its contacts leave free, and its weight times the share of it in which the
+            plan is right.
     """
-    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, spiral, probing)
-    if any(move.refused is not None for move in arm):
-        return 0.0
-    rng = np.random.default_rng(_STREAM)
-    fits = dict[tuple[str, ...], float]()
-    score = 0.0
-    for each in explained:
-        kept = replace(plan, assembly=_without(plan.assembly, each.dropped)) if each.dropped else plan
-        if each.dropped not in fits:
-            fits[each.dropped] = _fit_share(kept, where, arm, ends)
-        truths = draw_truths(each, max(1, round(TRUTHS * each.weight)), rng)
-        score += each.weight * fits[each.dropped] * _cover_share(kept, truths, where)
-    return score
+    assembly = shares.plan.assembly
+    poses = shares.plan.target_poses
+    judged = shares.judged
+    named = min(1.0, sum(each.weight for each, _, _ in explained))
+    trusted = [one for one in explained if not one[0].dropped]
+    best, space, _ = (trusted or explained)[0]
+    if space is not None and (rates.missing > _RARELY or shares.falls(assembly)):
+        odds = rates.missing / (1.0 - rates.missing)
+        shares.missing = [
+            each._replace(log_weight=each.log_weight + math.log(odds))
+            for each in missing_contacts(best.believed, space, judged)
+        ]
+    evidence = ContactEvidence(believed)
+    branches = list[tuple[float, float]]()  # log of prior times likelihood, share in which the plan is right
+    if trusted:
+        base = evidence.log_density()
+        if best.believed is not believed:
+            outliers = _count_outliers(believed, best.believed)
+            base = ContactEvidence(best.believed).log_density() + outliers * math.log(_OUTLIER)
+        whole = sum(each.weight for each, _, _ in trusted)
+        base += math.log(whole / best.weight) + math.log(1.0 - rates.false - rates.shifted)
+        covered = sum(right for _, _, right in trusted) / whole / max(shares.fit(assembly), _LEAST)
+        branches.append((base, named * min(1.0, covered) * shares.fit_or_missing(assembly)))
+        if not correction.hypotheses and correction.test is not None and not correction.test.passes:
+            for log_weight, truth in gross_errors(believed):
+                right = shares.fit_or_missing(assembly) * shares.cover(assembly, truth[None])
+                branches.append((log_weight, right))
+    errors = list(evidence.errors(poses, judged, rates))
+    likely = max([one[0] for one in branches] + [each.log_weight for each in errors]) - _IMPOSSIBLE
+    for each in (each for each in errors if each.log_weight > likely):
+        rest = _remove(assembly, each)
+        log_weight = each.log_weight
+        if not each.exists and shares.falls(rest):
+            # The part stood in the demonstration, so a contact that carries it must be missing too.
+            log_weight += math.log(rates.missing)
+        right = shares.fit_or_missing(rest, assembly if each.exists else rest) * each.accepted
+        branches.append((log_weight, named * right * shares.cover(rest, evidence.truth(each)[None])))
+    mass, share_of = np.array(branches).T
+    weights = np.exp((mass - mass.max()) / TEMPERATURE)
+    return float(weights @ share_of / weights.sum())
+
+
+def _stated_mm(robot_error: str, probing: bool) -> float:
+    """About how far stated errors of a robot displace a part, [mm]; if it probes, only the slips in its hand count."""
+    sigmas = parse_robot_error(robot_error)
+    base, joints, hand = _LEVERS_MM
+    slip = sigmas.in_hand[0] + hand * math.radians(sigmas.in_hand[1])
+    if probing:
+        return slip
+    return (
+        slip
+        + sigmas.tool_mm
+        + sigmas.hand_eye[0]
+        + math.radians(base * sigmas.hand_eye[1] + joints * sigmas.joints_deg)
+    )
+
+
+def _count_outliers(believed: Observation, assumed: Observation) -> int:
+    """Number of operations of which another pose or covariance is assumed than observed, but for a common scale."""
+    moved = np.abs(assumed.poses - believed.poses).max(axis=(1, 2)) > _SAME
+    ratio = np.trace(assumed.covariance, axis1=1, axis2=2) / np.trace(believed.covariance, axis1=1, axis2=2)
+    return int((moved | (ratio > ratio.min() * (1.0 + _SAME))).sum())
+
+
+def _remove(assembly: Assembly, error: ContactError) -> Assembly:
+    """The assembly without the contact of an error."""
+    return _exchange(assembly, error.made, lambda contacts: tuple(c for c in contacts if c != error.contact))
+
+
+def _with(assembly: Assembly, error: ContactError) -> Assembly:
+    """The assembly with the contact of an error in addition."""
+    return _exchange(assembly, error.made, lambda contacts: (*contacts, error.contact))
+
+
+def _exchange(assembly: Assembly, k: int, change: Callable[[tuple[Contact, ...]], tuple[Contact, ...]]) -> Assembly:
+    """The assembly with other contacts of operation k."""
+    operations = list(assembly.operations)
+    operations[k] = replace(operations[k], contacts=change(operations[k].contacts))
+    return replace(assembly, operations=tuple(operations))
 
 
 def _by_arm(
@@ -193,13 +314,21 @@ def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
     return _spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)
 
 
-def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
-    """Draw possible true poses of an explanation, (count, n, 4, 4), along directions that contacts leave free."""
-    goals = explanation.poses
+def _free_space(explanation: PossibleTruth) -> FreeSpace | None:
+    """What the contacts of an explanation leave free; None if that is nothing or unknown."""
     try:
-        space = free_space(explanation.believed, goals)
+        return free_space(explanation.believed, explanation.poses)
     except InputError:
-        space = None
+        return None
+
+
+def draw_truths(explanation: PossibleTruth, space: FreeSpace | None, count: int, rng: np.random.Generator) -> Array:
+    """Draw possible true poses of an explanation, (count, n, 4, 4), along directions that contacts leave free.
+
+    Args:
+        space: Of the explanation.
+    """
+    goals = explanation.poses
     truths = np.repeat(goals[None], count, axis=0)
     if space is not None:
         widths = _widths(space)
@@ -231,6 +360,8 @@ def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Arr
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     """The assembly without the named contacts."""
+    if not dropped:
+        return assembly
     left = {
         (relation.made, relation.contact)
         for relation, kept in zip(assembly.relations(), assembly.without(dropped), strict=True)
@@ -243,50 +374,96 @@ def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     return replace(assembly, operations=tuple(operations))
 
 
-def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Poses]) -> float:
-    """Probability that all measures of a plan are within their limits, as a product over measures, mean over robots.
+class _Shares:
+    """Shares of the draws in which one plan is right, if given contacts are the true ones."""
 
-    Args:
-        ends: From `_by_arm`; empty: as planned.
-    """
-    scenario = where if isinstance(where, Scenario) else where.scenario
-    # |cosine| of each insertion axis with the vertical
-    ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
-    # per operation, for `_within`
-    less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
-    lengths = where.clearance_mm, scenario.thresholds
-    planned = measure_plan(plan, *lengths, scenario.attach, arm=arm)
-    # With drawn robots only stability comes from the plan itself; the other measures are drawn.
-    stands = np.prod([_within(each, less_mm) for each in planned if each.kind in _WEIGHED or not ends])
-    if not ends:
-        return float(stands)
-    drawn = measure_drawn_plans(plan, *lengths, scenario.attach, arm, ends)
-    return float(stands * np.array([_within(each, less_mm) for each in drawn]).prod(axis=0).mean())
+    def __init__(
+        self, plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Poses], slack_mm: float
+    ) -> None:
+        """Args:
+            slack_mm: Standard deviation of what the measures neglect.
+        arm, ends: From `_by_arm`; without ends: as planned.
+        """
+        scenario = where if isinstance(where, Scenario) else where.scenario
+        self.plan = plan
+        self.judged = Judged(scenario.attach, scenario.thresholds, where.clearance_mm, slack_mm)
+        self._arm = arm
+        self._ends = ends
+        # |cosine| of each insertion axis with the vertical
+        ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
+        # per operation, reduction of the judge's limit for insertion contacts, [mm]
+        self._less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
+        self._final = compute_placements(plan.assembly, plan.start, plan.target_poses)[-1]
+        self._known = dict[Assembly, tuple[float, float]]()
+        self.missing: Sequence[ContactError] | None = None
+        """Contacts that may be missing; the weight of each is its odds against none. None: none is missing."""
 
+    def fit(self, assembly: Assembly, standing: Assembly | None = None) -> float:
+        """Probability that all measures of the plan are within their limits, mean over robots.
 
-def _within(measure: Measure | DrawnMeasure, less_mm: Sequence[float]) -> Array:
-    """Probability that one measure is within its limit, (), or (r,) for r draws.
+        Args:
+            standing: The assembly with whose contacts parts stand; default: the same.
+        """
+        return self._fit(standing or assembly)[0] * self._fit(assembly)[1]
 
-    Args:
-        less_mm: Per operation, reduction of the judge's limit for insertion contacts, [mm].
-    """
-    if isinstance(measure, Measure) and measure.kind in _WEIGHED:
-        return np.asarray(_FALLS if measure.exceeded else 1.0)
-    allowed = measure.allowed - (less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0)
-    return np.asarray(ndtr((allowed - measure.size) / _SLACK_MM))
+    def fit_or_missing(self, assembly: Assembly, standing: Assembly | None = None) -> float:
+        """The share of `fit`, as a mean over no missing contact and each that may be missing.
 
+        Args:
+            standing: As of `fit`.
+        """
+        fit = self.fit(assembly, standing) * (_FALLS if self._hovers(standing or assembly) else 1.0)
+        falls = self.falls(standing or assembly)
+        # A part that would fall stood in the demonstration, so that nothing is missing is less likely.
+        total = _FALLEN if falls else 1.0
+        right = total * fit
+        for each in self.missing or ():
+            odds = math.exp(each.log_weight)
+            total += odds
+            right += odds * each.accepted * (self.fit(_with(assembly, each)) if falls else fit)
+        return right / total
 
-def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
-    """Probability that faces overlap as the judge requires, if the plan is executed exactly; mean over the truths.
+    def falls(self, assembly: Assembly) -> bool:
+        """Whether a part of the plan would fall or lean, or nothing carries it."""
+        return self._fit(assembly)[0] < 1.0 or self._hovers(assembly)
 
-    Args:
-        truths: From `draw_truths`, (count, n, 4, 4).
-    """
-    scenario = where if isinstance(where, Scenario) else where.scenario
-    overlaps = compute_least_overlaps(
-        plan.assembly, compute_placements(plan.assembly, plan.start, plan.target_poses)[-1], truths
-    )
-    possible = overlaps[np.isfinite(overlaps)]  # without truths in which faces do not meet
-    if not len(possible):
-        return _UNKNOWN
-    return float(np.mean(ndtr((possible - scenario.thresholds.overlap_fraction) / _SLACK_SHARE)))
+    def _hovers(self, assembly: Assembly) -> bool:
+        """Whether an operation makes no contact, although contacts may be missing: then nothing carries its part."""
+        return self.missing is not None and not all(operation.contacts for operation in assembly.operations)
+
+    def _fit(self, assembly: Assembly) -> tuple[float, float]:
+        """(stands, others): `_FALLS` for each part that would fall or lean, and the share of the other measures."""
+        if assembly not in self._known:
+            judged = self.judged
+            plan = self.plan if assembly is self.plan.assembly else replace(self.plan, assembly=assembly)
+            lengths = judged.clearance_mm, judged.thresholds, judged.attach
+            planned = list(measure_plan(plan, *lengths, arm=self._arm))
+            stands = math.prod(_FALLS for each in planned if each.kind in _WEIGHED and each.exceeded)
+            others: Iterable[Measure | DrawnMeasure] = (each for each in planned if each.kind not in _WEIGHED)
+            if self._ends:
+                others = measure_drawn_plans(plan, *lengths, self._arm, self._ends)
+            # What is neglected is the same for all measures, so the worst one decides.
+            worst = np.array([self._within(each) for each in others]).min(axis=0, initial=1.0)
+            self._known[assembly] = stands, float(worst.mean())
+        return self._known[assembly]
+
+    def _within(self, measure: Measure | DrawnMeasure) -> Array:
+        """Probability that one measure is within its limit, (), or (r,) for r draws."""
+        less_mm = self._less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0
+        room_mm = measure.allowed - less_mm - measure.size
+        if measure.kind == "side":
+            return np.asarray(ndtr(room_mm / SIDE_MM))
+        return share_within(room_mm, self.judged.slack_mm)
+
+    def cover(self, assembly: Assembly, truths: Array) -> float:
+        """Probability that faces overlap as the judge requires, if the plan is executed exactly; mean over truths.
+
+        Args:
+            assembly: With the contacts that count.
+            truths: (count, n, 4, 4), possible true poses.
+        """
+        overlaps = compute_least_overlaps(assembly, self._final, truths)
+        possible = overlaps[np.isfinite(overlaps)]  # without truths in which faces do not meet
+        if not len(possible):
+            return _UNKNOWN
+        return float(np.mean(ndtr((possible - self.judged.thresholds.overlap_fraction) / _SLACK_SHARE)))

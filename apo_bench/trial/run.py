@@ -209,7 +209,8 @@ def _plan_and_replay(
         record = end_record(planned.failure, success=False)
     else:
         predicted_success = predict_success(
-            planned.plan, given, planned.correction, context.scene, config.robot_error, spiral, probe
+            *(planned.plan, given, planned.correction, context.scene),
+            *(config.robot_error, spiral, probe, config.contact_source),
         )
         prediction = predicted_outcome(planned.plan, context.scene, spiral)
         if predicted_success < config.min_predicted_success:

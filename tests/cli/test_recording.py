@@ -34,7 +34,7 @@ def folder(tmp_path: Path) -> Path:
 
 def run(folder: Path, *more: str) -> int:
     files = ("--camera", str(folder / "c.toml"), "--objects", str(folder / "o.toml"))
-    return main(["recording", "import", str(folder / "log.csv"), "--format", "csv", *files, *more])
+    return main(["recording", "import", str(folder / "log.csv"), *files, *more])
 
 
 def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,7 +45,8 @@ def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.Ca
         found = read_observation(folder / out, NAME)
         assert np.abs(pose.log(pose.inverse(wanted) @ found.poses)[:, :3]).max() < 1e-3
     said = capsys.readouterr().out
-    assert "read as  quaternions as wxyz" in " ".join(said.split("\n")[1].split(" "))
+    assert [line.split(" ")[0] for line in said.splitlines()[:5]] == ["read", "frames", "camera", "placed", "rests"]
+    assert "quaternions as wxyz" in said.splitlines()[0]
     assert (folder / "p.png").stat().st_size > 10_000
     assert (folder / "p.csv").read_text(encoding="utf-8").startswith("operation,part,t_s,x_mm")
     assert json.loads((folder / "a.json").read_text(encoding="utf-8"))["scenario"] == NAME

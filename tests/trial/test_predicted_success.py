@@ -165,3 +165,24 @@ def test_below_abstain_the_arm_never_moves(
     assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "predicted-success", "abstained")
     assert (kept["sim_time_s"], kept["reached"]) == (None, None)
     assert kept["predicted_success"] == carried_out["predicted_success"]
+
+
+def test_wrong_contacts_lower_the_prediction_where_nothing_else_fixes_them(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    """Without the two sides that fix the stick sideways, its place there is a guess; a doubled contact is no loss."""
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    last = seen.assembly.operations[-1]
+    sides = [c for c in last.contacts if c.manipulated.face in ("py", "ny")]
+
+    def predicted_success(missing: list[Any], source: str) -> float:
+        kept = tuple(c for c in last.contacts if c not in missing)
+        assembly = replace(seen.assembly, operations=(*seen.assembly.operations[:-1], replace(last, contacts=kept)))
+        planned = apply_method("contact", replace(seen, assembly=assembly), None, where=scene)
+        assert planned.plan is not None
+        given = replace(seen, assembly=assembly)
+        return predict_success(planned.plan, given, planned.correction, scene.scenario, contact_source=source)
+
+    whole = predicted_success([], "given")
+    assert predicted_success(sides[:1], "false-negative") > whole - 0.1
+    assert predicted_success(sides, "false-negative") < whole - 0.2

@@ -48,6 +48,8 @@ VIEW = copy_frozen(np.diag(np.repeat([0.02, np.radians(5.0)], 3) ** 2))
 ROOM = copy_frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
 """Covariance of a Gaussian that is as dense at its centre as poses anywhere in half a metre, of any rotation, (6, 6),
 [m, rad]."""
+ALIKE = 0.75
+"""Share of the exchanges that are between parts of equal shape, for a part that has such and others."""
 _SURE_OF_RATE = 5.0
 """Number of operations that the stated rate of gross observations counts for as prior evidence."""
 
@@ -66,7 +68,9 @@ class Sighting(NamedTuple):
     ray: Array | None = None
     """Direction from the camera to the part, unit vector, (3,), frame of the part; None if unknown."""
     others: tuple[int, ...] = ()
-    """Operations whose view may have been exchanged with this one."""
+    """Operations whose view may have been exchanged with this one, those on parts of equal shape first."""
+    alike: int = 0
+    """How many of these are on parts of equal shape."""
 
 
 def swapped_with(k: int) -> int:
@@ -116,10 +120,18 @@ def share(view: Sighting, belief: int, model: OutlierModel) -> float:
         return model.broad / inlier
     if belief < 0:
         # Two views are exchanged at once, so each is charged for half of it.
-        return float(np.sqrt(model.gross / inlier * swap / len(view.others)))
+        return float(np.sqrt(model.gross / inlier * swap * _share_of_pair(view, swapped_with(belief))))
     if belief == GROSS:
         return model.gross / inlier * (1.0 - swap - turned - sum(kinds.values()))
     return model.gross / inlier * (kinds[belief] if belief in kinds else turned / flips)
+
+
+def _share_of_pair(view: Sighting, k: int) -> float:
+    """The share of the exchanges of a view that are with that of operation k."""
+    unlike = len(view.others) - view.alike
+    if not view.alike or not unlike:
+        return 1.0 / len(view.others)
+    return ALIKE / view.alike if k in view.others[: view.alike] else (1.0 - ALIKE) / unlike
 
 
 def log_volume(covariance: Array) -> float:

@@ -127,6 +127,14 @@ def displace_together(states: States) -> Iterator[States]:
         yield from (change_states(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
 
 
+def exchanges(case: Case, start: States) -> Iterator[States]:
+    """Yield states in which the views of any two operations are swapped."""
+    for k, state in enumerate(start):
+        for i in case.views[k][0].others if state else ():
+            if i > k and start[i]:
+                yield change_states(start, (k, i), ((swapped_with(i), *state[1:]), (swapped_with(k), *start[i][1:])))
+
+
 def false_together(case: Case, start: States) -> Iterator[States]:
     """Yield states for the case that no set of operations agrees without the rest.
 
@@ -134,10 +142,7 @@ def false_together(case: Case, start: States) -> Iterator[States]:
     """
     seen = [k for k, state in enumerate(start) if state]
     yield change_states(start, seen, [(GROSS,) * len(start[k]) for k in seen])
-    for k in seen:
-        for i in case.views[k][0].others:
-            if i > k and start[i]:
-                yield change_states(start, (k, i), ((swapped_with(i), *start[k][1:]), (swapped_with(k), *start[i][1:])))
+    yield from exchanges(case, start)
     for row in combinations(range(len(start)), 2):
         between = range(row[0], row[1] + 1)
         if all(len(start[k]) == 1 for k in between):

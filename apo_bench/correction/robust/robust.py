@@ -21,7 +21,7 @@ from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
-from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
+from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated, retest_as_chosen
 from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, region_scale, scale_noise, scale_words
 from apo_bench.correction.robust.search import Search
@@ -185,7 +185,7 @@ def _report(
         noise_scale=best.scale,
         gap_before_m=before if observation.observed.all() else np.nan,
         test=first.correction.test or correction.test,
-        test_after=best.test,
+        test_after=retest_as_chosen(best),
         left_out=best.left_out,
         assumed=best.stated,
         hypotheses=hypotheses,

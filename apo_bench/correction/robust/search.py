@@ -28,6 +28,7 @@ from apo_bench.correction.robust.nearby import (
     change_states,
     continue_states,
     displace_together,
+    exchanges,
     false_together,
     likely_beliefs,
     swaps,
@@ -37,6 +38,8 @@ from apo_bench.geometry import Array
 
 MOST_EXACT = 12
 """Number of operations up to which every set is checked; beyond, sets grow by one operation at a time."""
+_MOST_EXCHANGED = 8
+"""Number of operations up to which any two are tried as swapped, whatever else is in doubt."""
 _LENIENT = 1e-4
 """A set is not solved if the contacts that remain agree with a p-value below this."""
 _MOST_SOLVED = 24
@@ -196,6 +199,8 @@ class Search:
         If none passes, the most likely of all that were solved.
         """
         tried = self._solve((start, (relation,)) for relation in self._relations(start))
+        if self.operations <= _MOST_EXCHANGED:
+            tried += self._solve((states, ()) for states in exchanges(self._case, start))
         gross = self._case.model.surprises[GROSS]
         for size, sets in enumerate(self._sets(start), start=1):
             if self._looked_at() > _MOST_ALTOGETHER:
@@ -267,7 +272,8 @@ class Search:
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
             for i, now in enumerate(state):
                 # Of several views of an operation that is in doubt the one that is assumed may be the false one.
-                if now == DISPLACED or set(state) == {INLIER}:
+                # Of two exchanged views none is changed alone.
+                if now == DISPLACED or now < 0 or set(state) == {INLIER}:
                     continue
                 blank = change_states(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
                 yield blank

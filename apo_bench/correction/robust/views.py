@@ -84,7 +84,9 @@ def add_views(
         others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.observed[i]]
         like = [i for i in others if assembly.solids[mains[i]] is assembly.solids[mains[k]]]
         flips = find_approximate_symmetries(assembly.solids[mains[k]]).turns
-        seen = Sighting(T, observation.covariance[k], flips, before[k], ray, tuple(like or others) if not old else ())
+        unlike = [i for i in others if i not in like]
+        pairs = ((), 0) if old else ((*like, *unlike), len(like))
+        seen = Sighting(T, observation.covariance[k], flips, before[k], ray, *pairs)
         grown.append((*old, seen))
     return tuple(grown)
 

@@ -1,19 +1,29 @@
 """Arrange a log: find the camera pose, the starts of parts and the order of operations, and how well they fit."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, measure_extent, pose
+from apo_bench.geometry import Array, Solid, find_symmetries, measure_extent, pose
 from apo_bench.importers.recording.camera_file import CameraFile
-from apo_bench.importers.recording.camera_pose import CameraPose, find_camera
+from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
-from apo_bench.importers.recording.ordering import Order, Stated, end_of_operation, find_order, stated_order
+from apo_bench.importers.recording.folding import fold_to
+from apo_bench.importers.recording.ordering import (
+    NoMatchingOrder,
+    Order,
+    Stated,
+    end_of_operation,
+    find_order,
+    stated_order,
+)
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _HIGH_M = 0.01  # largest difference of height between the start of a part and its plan
+_OTHER_IMAGE_MM = 10.0
+"""Another image of a placed part counts if its contacts fit better by this; a degree counts like a millimetre."""
 _TILTED_DEG = 10.0  # largest difference of tilt
 """Beyond these limits, a part starts otherwise than planned: `otherwise` in `Arrangement.start_source`."""
 
@@ -43,10 +53,6 @@ class Arrangement(NamedTuple):
         return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
 
 
-Arrange = Callable[[RestIntervals], Arrangement]
-"""Function that arranges rest intervals with the same camera file, scenario and statements."""
-
-
 def arrange(
     intervals: RestIntervals, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
 ) -> Arrangement:
@@ -60,18 +66,47 @@ def arrange(
         NoMatchingOrder: The motions in the log do not match the operations.
         InputError: The camera file states no pose of the camera.
     """
-    solved = find_camera(intervals, camera, planned, assembly.fixed)
+    found: list[Arrangement] = []
+    failed: NoMatchingOrder | None = None
+    for solved in find_cameras(intervals, camera, planned, assembly.fixed, assembly.solids):
+        try:
+            found.append(_arrange_seen(intervals, solved, camera, assembly, planned, stated))
+        except NoMatchingOrder as error:
+            failed = failed or error
+        if found and found[-1].wrong_mm < _OTHER_IMAGE_MM:
+            break
+    if not found:
+        raise failed or NoMatchingOrder("no camera pose is found.")
+    return min(found, key=lambda each: each.wrong_mm)
+
+
+def _arrange_seen(
+    intervals: RestIntervals, solved: CameraPose, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
+) -> Arrangement:
+    """Find the order of operations for a camera pose; arguments as in `arrange`."""
     X = solved.T_world_camera
+    expected = {**planned, **camera.places(planned)}
+    intervals = {
+        part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ expected[part])
+        for part, known in intervals.items()
+    }
     standing = {part: _since_standing(known, assembly, planned[part], X) for part, known in intervals.items()}
     begun = {part: X @ known[0].rests[0].T for part, known in standing.items() if known}
     start, source = find_starts(begun, camera, planned)
     in_hand = {part: "in the hand" for part in standing if part not in begun and source[part] == "scenario"}
     intervals = {part: standing[part] or known for part, known in intervals.items()}
-    if stated.ends:
+
+    def order_all(intervals: RestIntervals) -> Order:
         # Parts that a hand held all the time take their start from the scenario.
-        order = stated_order(assembly, intervals, stated.ends)
-    else:
-        order = find_order(assembly, intervals, start, X, stated.unseen)
+        if stated.ends:
+            return stated_order(assembly, intervals, stated.ends)
+        return find_order(assembly, intervals, start, X, stated.unseen)
+
+    order = order_all(intervals)
+    imaged = _image_as_in_contact(assembly, intervals, order, start, X)
+    if imaged is not intervals:
+        intervals = imaged
+        order = order_all(intervals)
     fits = {}
     for k, interval in enumerate(order.intervals):
         if interval is not None:
@@ -79,6 +114,49 @@ def arrange(
             reached = {part: X @ T for part, T in find_rest_poses(intervals, t).items()}
             fits[k] = contact_fit(assembly, k, {**start, **reached})
     return Arrangement(solved, order, start, {**source, **in_hand}, fits, intervals)
+
+
+def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Array) -> tuple[RestInterval, ...]:
+    """Return the intervals of a part with the image at which its first rest is turned least from the plan.
+
+    Args:
+        expected: Start of the part in the scenario, (4, 4), camera from part.
+    """
+    first = known[0].rests[0].T
+    g = pose.inverse(first) @ fold_to(solid, first, expected)
+    return tuple(interval.turn(g) for interval in known)
+
+
+def _image_as_in_contact(
+    assembly: Assembly, intervals: RestIntervals, order: Order, start: Poses, X: Array
+) -> RestIntervals:
+    """Return the intervals with the images of placed parts that make contact, the same intervals if all do.
+
+    Between frames, or while it is hidden, a part may turn so far that another image is nearer than its own.
+    """
+    changed = dict(intervals)
+    for k, interval in enumerate(order.intervals):
+        if interval is None:
+            continue
+        part = interval.part
+        known = intervals[part]
+        begins = known.index(interval)
+        t = end_of_operation(assembly, intervals, order.intervals, k)
+        reached = {**start, **{other: X @ T for other, T in find_rest_poses(changed, t).items()}}
+        # The part itself, and if it fits at none of its images, each part that it touches.
+        beside = sorted({contact.environment.part for contact in assembly.operations[k].contacts} & changed.keys())
+        for other in (part, *beside):
+            turns = find_symmetries(assembly.solids[other])
+            wrong = [contact_fit(assembly, k, {**reached, other: reached[other] @ g}).wrong_mm for g in turns]
+            best = int(np.argmin(wrong))
+            if wrong[best] < wrong[0] - _OTHER_IMAGE_MM:
+                first = begins if other == part else 0
+                turned = [each.turn(turns[best]) for each in changed[other][first:]]
+                changed[other] = (*changed[other][:first], *turned)
+                reached = {**reached, other: reached[other] @ turns[best]}
+            if min(wrong) < _OTHER_IMAGE_MM:
+                break
+    return intervals if changed == dict(intervals) else changed
 
 
 def _since_standing(

@@ -24,7 +24,7 @@ class Conventions(FileTable, frozen=True, kw_only=True):
 
     length: Literal["mm", "cm", "m"] | None = None
     angle: Literal["deg", "rad"] | None = None
-    time: Literal["s", "ms", "us", "ns"] = "s"
+    time: Literal["s", "ms", "us", "ns"] | None = None
     quaternion: Literal["wxyz", "xyzw"] | None = None
     """Order of the four numbers of a quaternion without names, q0 to q3."""
     euler: str | None = None
@@ -37,8 +37,9 @@ class Conventions(FileTable, frozen=True, kw_only=True):
     """Whether poses are those of the camera in the frame of the model."""
     mirror: Literal["x", "y", "z"] | None = None
     """The reversed axis of a left-handed tracker."""
-    columns: dict[str, str] = field(default_factory=dict)
-    """Name of a column as this package knows it -> its name in the file."""
+    columns: dict[str, str] | list[str] = field(default_factory=dict)
+    """Name of a column as this package knows it -> its name in the file; or the names of all columns of a file without
+    a header, empty for those that are ignored."""
 
 
 class RestNoiseTable(FileTable, frozen=True, kw_only=True):

@@ -1,6 +1,6 @@
 """Find the pose of the camera: as stated, or solved from the first rests of parts at known places."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import final
@@ -9,12 +9,18 @@ import numpy as np
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
-from apo_bench.geometry import Array, copy_frozen, pose
+from apo_bench.geometry import Array, Solid, copy_frozen, pose
 from apo_bench.importers.recording.averaging import Mean
 from apo_bench.importers.recording.camera_file import CameraFile
+from apo_bench.importers.recording.folding import fold_to, free_twist, list_images
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
 _ROUNDS = 50  # largest number of Gauss-Newton iterations
+_TURNS = 24  # turns about the axis of a known part of revolution from which the solution is searched
+_AS_LIKELY = 20.0  # difference of costs for each part below which camera poses are equally likely
+_OTHER_RAD = 0.2  # camera poses that differ less are the same
+_MOST_CAMERAS = 8
+_SINGULAR = 1e12  # condition of normal equations that leave a direction open
 _PLACE_DEVIATION = copy_frozen(np.repeat([2e-4, 2e-3], 3), 6)
 """Standard deviation of a known place along and about each axis, [m, rad]."""
 
@@ -42,14 +48,19 @@ class CameraPose:
         return max((float(np.degrees(np.linalg.norm(r[3:]))) for r in self.residuals.values()), default=0.0)
 
 
-def find_camera(
-    intervals: RestIntervals, camera: CameraFile, planned: Poses, fixed: Collection[str] = ()
-) -> CameraPose:
-    """Return the camera pose as stated, or solve it from the first rests of parts at known places.
+def find_cameras(
+    intervals: RestIntervals,
+    camera: CameraFile,
+    planned: Poses,
+    fixed: Collection[str] = (),
+    solids: Mapping[str, Solid] | None = None,
+) -> list[CameraPose]:
+    """Return the camera pose as stated, or those that are as likely from the first rests of parts at known places.
 
     Args:
         planned: Start of the parts in the scenario, world, [m].
         fixed: Parts that never move; they may have a known place though they are not tracked.
+        solids: Shapes of parts, whose symmetric images are observed too.
 
     Raises:
         InputError: Neither is stated, or a known part that may move is not tracked.
@@ -57,7 +68,7 @@ def find_camera(
     for part in camera.known:
         require_known("tracked part", part, {*intervals, *fixed}, place="the camera file, known")
     if camera.T_world_camera is not None:
-        return CameraPose(camera.T_world_camera)
+        return [CameraPose(camera.T_world_camera)]
     places = {part: T for part, T in camera.places(planned).items() if intervals.get(part)}
     require(
         places,
@@ -65,7 +76,7 @@ def find_camera(
         'table [pose], or [known] with parts such as castle1 = "start", which is a place of a scenario.',
     )
     means = {part: intervals[part][0].rests[0].mean for part in places}
-    return solve_camera(places, means, rest_error(camera, next(iter(means.values()))))
+    return solve_cameras(places, means, rest_error(camera, next(iter(means.values()))), solids or {})
 
 
 def rest_error(camera: CameraFile, mean: Mean) -> Array:
@@ -76,8 +87,10 @@ def rest_error(camera: CameraFile, mean: Mean) -> Array:
     return mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2)
 
 
-def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], constant: Array) -> CameraPose:
-    """Solve for the camera pose X that puts observed parts at their known places: weighted least squares on SE(3).
+def solve_cameras(
+    known: Mapping[str, Array], observed: Mapping[str, Mean], constant: Array, solids: Mapping[str, Solid] | None = None
+) -> list[CameraPose]:
+    """Solve for the camera poses X that put observed parts at their known places: weighted least squares on SE(3).
 
     X exp(d) M = K exp(r): residuals r of parts observed at M and standing at K change by Ad(M^-1) d.
 
@@ -85,16 +98,43 @@ def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], const
         known: Part -> its pose in the world, K, (4, 4), [m].
         observed: Part -> its mean pose in the camera, M.
         constant: (6, 6), covariance of the error that is constant while a part rests, [m, rad].
+        solids: Shapes of parts. A few symmetric parts may fit at several camera poses; those with the parts as they
+            were reported come first.
     """
     parts = tuple(known)
+    shapes = [None if solids is None else solids.get(p) for p in parts]
     K = np.array([known[p] for p in parts])
     M = np.array([observed[p].T for p in parts])
     W = np.array([np.linalg.inv(observed[p].covariance + constant + np.diag(_PLACE_DEVIATION**2)) for p in parts])
+    for i, shape in enumerate(shapes):
+        free = None if shape is None else free_twist(shape)
+        if free is not None:  # no weight along the turn that is not observed
+            W[i] -= np.outer(W[i] @ free, W[i] @ free) / (free @ W[i] @ free)
+    # Each part alone gives X = K M^-1, at each of its images; start from those with the least total cost.
+    begun = [
+        K[i] @ pose.inverse(image)
+        for i, shape in enumerate(shapes)
+        for image in ([M[i]] if shape is None else list_images(shape, M[i], _TURNS))
+    ]
+    costs = np.array([_cost(_residuals(X, K, _fold_all(X, K, M, shapes)), W) for X in begun])
+    kept: list[Array] = []
+    for i in np.argsort(np.round(costs / _AS_LIKELY), kind="stable"):
+        is_new = all(np.linalg.norm(pose.log(pose.inverse(X) @ begun[i])[3:]) > _OTHER_RAD for X in kept)
+        if costs[i] < costs.min() + _AS_LIKELY * len(parts) and is_new and len(kept) < _MOST_CAMERAS:
+            kept.append(begun[i])
+    return [_refine(X, parts, K, _fold_all(X, K, M, shapes), W) for X in kept]
+
+
+def _refine(X: Array, parts: Sequence[str], K: Array, M: Array, W: Array) -> CameraPose:
+    """Return the camera pose nearest to X with the least cost, by Gauss-Newton steps."""
     # Normal equations of r + A d = 0, the sum of A^t W A over parts; A hardly depends on X, so it is computed once.
     A = pose.adjoint(pose.inverse(M))
     normal = np.einsum("kji,kjl,klm->im", A, W, A)
-    # Each part alone gives X = K M^-1; start from the one with the least total cost.
-    X = min(K @ pose.inverse(M), key=lambda X: _cost(_residuals(X, K, M), W))
+    require(
+        np.linalg.cond(normal) < _SINGULAR,
+        f"the camera file: {', '.join(parts)} alone leave a turn of the camera about an axis of revolution open; add "
+        "another part to [known].",
+    )
     for _ in range(_ROUNDS):
         r = _residuals(X, K, M)
         step = -np.linalg.solve(normal, np.einsum("kji,kjl,kl->i", A, W, r))
@@ -105,6 +145,14 @@ def solve_camera(known: Mapping[str, Array], observed: Mapping[str, Mean], const
     # Chi-square over its degrees of freedom estimates by how much the stated variances are too small.
     excess = max(1.0, _cost(r, W) / max(6 * len(parts) - 6, 1)) if len(parts) > 1 else 1.0
     return CameraPose(X, MappingProxyType(dict(zip(parts, r, strict=True))), excess * np.linalg.inv(normal))
+
+
+def _fold_all(X: Array, K: Array, M: Array, shapes: Sequence[Solid | None]) -> Array:
+    """Return the images of observed poses M nearest to known poses K, (k, 4, 4), for a camera pose X."""
+    expected = pose.inverse(X) @ K
+    return np.array(
+        [T if shape is None else fold_to(shape, T, E) for shape, T, E in zip(shapes, M, expected, strict=True)]
+    )
 
 
 def _residuals(X: Array, K: Array, M: Array) -> Array:

@@ -10,6 +10,7 @@ from apo_bench.importers.recording.arrangement import Arrangement
 from apo_bench.importers.recording.averaging import per_axis
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
+_MANY = 0.25  # share of outliers among the frames of a rest that is doubtful
 _OPEN_MM = 3.0  # smallest gap of a doubtful contact
 _OPEN_DEVIATIONS = 5.0  # standard deviations of the pose, added to the gap above
 """A contact is doubtful if it is open by more than the sum of both; a degree counts like a millimetre."""
@@ -24,11 +25,33 @@ def list_doubts(
         covariance: Covariance of each observed pose, (n, 6, 6), [m, rad].
     """
     return (
+        *_not_observed(arrangement, assembly),
         *_rivals(arrangement),
+        *_outliers(intervals, arrangement),
         *_open_contacts(arrangement, covariance, assembly),
         *_pauses(intervals, arrangement, assembly),
         *_hidden(intervals),
     )
+
+
+def _not_observed(arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
+    """Yield a sentence for each operation whose end was not observed."""
+    for k, interval in enumerate(arrangement.order.intervals):
+        if interval is None:
+            yield f"operation {k + 1} ({assembly.operations[k].main}) was not observed, so its pose is unknown"
+
+
+def _outliers(intervals: RestIntervals, arrangement: Arrangement) -> Iterator[str]:
+    """Yield a sentence for each placed part of whose frames at rest many are wrong."""
+    for interval in arrangement.order.intervals:
+        if interval is None:
+            continue
+        inlier = np.concatenate([rest.mean.inlier for rest in interval.rests])
+        if (~inlier).mean() > _MANY:
+            yield (
+                f"{(~inlier).sum()} of {len(inlier)} frames of '{interval.part}' at rest from {interval.begins:.2f} s "
+                "on are outliers; if the tracker flips it, check the picture for its right pose"
+            )
 
 
 def _rivals(arrangement: Arrangement) -> Iterator[str]:

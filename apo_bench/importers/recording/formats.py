@@ -1,6 +1,6 @@
-"""Read logs of every supported format into tracks."""
+"""Read a log, or a folder of logs, into tracks; what stands in a file is recognised from its content."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
@@ -8,65 +8,114 @@ from types import MappingProxyType
 import numpy as np
 
 from apo_bench.errors import require, require_known
-from apo_bench.formats.bop import read_results
-from apo_bench.geometry import pose
 from apo_bench.importers.recording.camera_file import Conventions
+from apo_bench.importers.recording.log_columns import MATRIX, LogColumn
+from apo_bench.importers.recording.log_json import read_json_tables
 from apo_bench.importers.recording.log_poses import orient, read_rows
-from apo_bench.importers.recording.log_tables import LogTable, read_csv_table, read_ros_json_table, read_tum_table
+from apo_bench.importers.recording.log_tables import LogTable, read_text_tables
 from apo_bench.importers.recording.tracks import Log, LogRows, sort_rows
 
-FORMATS: Mapping[str, Callable[[Path], LogTable] | None] = MappingProxyType(
+_TABLES = ("a table", "columns", "positions", "times", "TUM", "KITTI", "EuRoC", "BOP", "Motive", "Vicon", "ros2")
+FORMATS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "csv": read_csv_table,
-        "tum": read_tum_table,
-        "ros-csv": read_csv_table,
-        "ros-json": read_ros_json_table,
-        "bop": None,
+        "auto": (),
+        "csv": _TABLES,
+        "tum": ("TUM",),
+        "kitti": ("KITTI",),
+        "euroc": ("EuRoC", "a table"),
+        "bop": ("BOP", "JSON"),
+        "motive": ("Motive",),
+        "vicon": ("Vicon",),
+        "plotjuggler": ("a table",),
+        "ros-csv": ("ros2", "a table", "columns"),
+        "ros-json": ("JSON",),
+        "json": ("JSON",),
+        "foundationpose": ("a matrix", "matrices"),
+        "megapose": ("JSON",),
+        "apriltag": ("JSON",),
     }
 )
-"""Name of a format -> its reader; None for BOP results, which hold numbers and not cells of text."""
+"""Name of a format -> beginnings of what files are recognised as."""
+_SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat", ".log", ".json", ".jsonl", ".npy")  # of logs in a folder
+_MATRIX_FOLDER = "ob_in_cam"  # in which FoundationPose writes one matrix for each image
+_NO_NAMES = (_MATRIX_FOLDER, "pose", "poses")  # folders that name no object
 
 
-def read_log(path: str | Path, form: str, how: Conventions) -> Log:
-    """Read a log, or a folder with one log per object, in one of `FORMATS`.
+def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
+    """Read a log, or a folder with one log per object or per image.
+
+    Args:
+        form: One of `FORMATS`; the log is read as its content demands, and a note says if that is another one.
 
     Returns:
         Tracks in metres and right-handed axes, camera from model.
 
     Raises:
-        InputError: A file is not as its format demands; the message names the line.
+        InputError: A file holds no poses that are understood; the message names the line.
     """
     require_known("format", form, FORMATS)
     path = Path(path)
-    files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
-    require(files, f"{path}: the folder holds no file; give a folder with one log for each object.")
-    read = FORMATS[form]
-    logs = [_read_bop(file, how) if read is None else read_rows(read(file), how) for file in files]
-    ids, t, T, places, notes = zip(*logs, strict=True)
-    poses, more = orient(np.concatenate(T), how)
-    rows = LogRows([*chain(*ids)], np.concatenate(t), poses, [*chain(*places)], [*notes[0], *more])
-    return sort_rows(str(path), rows)
-
-
-def _read_bop(path: Path, how: Conventions) -> LogRows:
-    """Read one scene of BOP results, in mm; of several estimates of an object in an image the best score counts."""
-    results = read_results(path)
-    scenes = np.unique(results.where[:, 0])
-    scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
-    require(
-        scene in scenes,
-        f"{path}: a recording is one scene, and the file holds {', '.join(map(str, scenes[:6].tolist()))}; state "
-        "`scene` in the camera file.",
+    files = _list_files(path) if path.is_dir() else [path]
+    require(files, f"{path}: the folder holds no log; give a folder with one log for each object or image.")
+    tables = [table for file in files for table in _read_file(file, how)]
+    others = {table.form for table in tables if form != "auto" and not table.form.startswith(FORMATS[form])}
+    if len(files) > 1:
+        tables = _name_by_folder(tables)
+    logs = [read_rows(table, how) for table in tables if table.rows]
+    require(logs, f"{path}: no pose stands in the log; give a log with one row per pose.")
+    poses, more = orient(np.concatenate([log.T for log in logs]), how)
+    rows = LogRows(
+        ids=[*chain(*(log.ids for log in logs))],
+        t=np.concatenate([log.t for log in logs]),
+        T=poses,
+        lost=np.concatenate([log.lost for log in logs]),
+        score=np.concatenate([log.score for log in logs]),
+        places=[*chain(*(log.places for log in logs))],
+        notes=[
+            *dict.fromkeys(chain(*(log.notes for log in logs))),
+            *more,
+            *([f"not {form}, as stated"] if others else []),
+        ],
     )
-    require(how.rate_hz, f"{path}: images are numbered and have no time; state `rate_hz` in the camera file.")
-    # Sorted by image and object, best score first; `unique` then keeps the first row of each pair.
-    at = np.flatnonzero(results.where[:, 0] == scene)
-    at = at[np.lexsort((-results.score[at], results.where[at, 2], results.where[at, 1]))]
-    at = at[np.unique(results.where[at, 1:], axis=0, return_index=True)[1]]
-    T = np.tile(np.eye(4), (len(at), 1, 1))
-    T[:, :3, :3] = pose.nearest_rotations(results.R[at])
-    T[:, :3, 3] = results.t_mm[at] * 1e-3
-    t = results.where[at, 1] / (how.rate_hz or 1.0)
-    ids = [str(k) for k in results.where[at, 2]]
-    notes = ["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz} images a second"]
-    return LogRows(ids, t, T, [results.spot(int(i)) for i in at], notes)
+    return sort_rows(str(path), rows, sum(table.broken for table in tables))
+
+
+def _list_files(path: Path) -> Sequence[Path]:
+    """Return the logs in a folder and its folders: those in folders of matrices alone if there are any."""
+    files = [file for file in sorted(path.rglob("*")) if file.is_file() and file.suffix.lower() in _SUFFIXES]
+    matrices = [file for file in files if file.parent.resolve().name == _MATRIX_FOLDER]
+    return matrices or files
+
+
+def _read_file(path: Path, how: Conventions) -> list[LogTable]:
+    if path.suffix.lower() == ".npy":
+        T = np.load(path, allow_pickle=False).reshape(-1, 4, 4)
+        columns = [*map(LogColumn, MATRIX), *map(LogColumn, "xyz")]
+        rows = [[*M[:3, :3].ravel(), *M[:3, 3]] for M in T.tolist() for M in [np.array(M)]]
+        return [LogTable(path, "matrices of NumPy", path.stem, columns, rows, [str(path)] * len(rows))]
+    if path.suffix.lower() in (".json", ".jsonl"):
+        return read_json_tables(path)
+    return read_text_tables(path, how.columns)
+
+
+def _name_by_folder(tables: Sequence[LogTable]) -> list[LogTable]:
+    """Return the tables of a folder with an object and an image for files that are named by an image, or by nothing."""
+    stems = [table.file.stem for table in tables]
+    by_image = all(stem.rpartition("_")[2].isdigit() for stem in stems) and all(
+        len(table.rows) < 50 for table in tables
+    )
+    repeated = len({*stems}) < len({table.file for table in tables})
+    named = []
+    for table, stem in zip(tables, stems, strict=True):
+        folder = table.file.resolve().parent
+        folder = folder.parent if folder.name in _NO_NAMES else folder
+        known = {column.meaning for column in table.columns if column is not None}
+        if (by_image and len(table.rows) == 1) or (by_image and not known & {"t", "sec", "frame"}):
+            if not known & {"t", "sec", "frame"}:
+                rows = [[*row, stem.rpartition("_")[2]] for row in table.rows]
+                table = table._replace(columns=[*table.columns, LogColumn("frame")], rows=rows)
+            table = table._replace(name=folder.name)
+        elif repeated and table.name == stem:
+            table = table._replace(name=folder.name)
+        named.append(table)
+    return named

@@ -1,8 +1,7 @@
 """Import the tracks of a log as the observation of one demonstration of a scenario."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -15,9 +14,11 @@ from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
+from apo_bench.importers.recording.folding import find_gross, fold_track
+from apo_bench.importers.recording.matching import TagOffset, list_choices
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
-from apo_bench.importers.recording.rest_intervals import find_all_intervals
+from apo_bench.importers.recording.rest_intervals import RestIntervals, find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.perception.observation.models import (
     UNOBSERVED_DEVIATION,
@@ -26,6 +27,8 @@ from apo_bench.perception.observation.models import (
     floor_covariance,
 )
 from apo_bench.scenario import Scenario, place_layout
+
+_MANY = 0.25  # share of gross frames of a part that is doubtful
 
 
 @final
@@ -37,8 +40,16 @@ class ImportedRecording:
     observation: Observation
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
-    unclear: tuple[str, ...]
-    """Doubts about the recording, one sentence each."""
+    covariance: Array
+    """(n, 6, 6), of each observed pose without errors of the camera pose and adjustments, [m, rad]."""
+    tracks: Mapping[str, PoseTrack]
+    """Folded track of each part, camera from part."""
+    folded: Mapping[str, int]
+    """Part -> number of frames folded to another image than most."""
+    gross: Mapping[str, int]
+    """Part -> number of frames that were left out, as they are far from the frames around."""
+    doubts: tuple[str, ...]
+    """What may be wrong with the recording, one sentence each."""
 
 
 def import_recording(
@@ -48,6 +59,8 @@ def import_recording(
     stated: Stated,
     file: str,
     models: Mapping[str, Array] | None = None,
+    identical: Sequence[Sequence[str]] = (),
+    offsets: Mapping[str, Sequence[TagOffset]] | None = None,
 ) -> ImportedRecording:
     """Return the observation that the tracks of one demonstration give.
 
@@ -55,6 +68,8 @@ def import_recording(
         tracks: Track of each part, camera from part.
         file: Name of the log, for messages.
         models: Part -> pose of its frame in the tracker's model, (4, 4), [m]; None: the identity for all.
+        identical: Groups of parts whose tracks may belong to one another.
+        offsets: Part -> uncertainty of the places of its tags.
 
     Raises:
         InputError: A part is not of the scenario or is missing, the moves are not its operations, or no contact fits.
@@ -67,15 +82,30 @@ def import_recording(
             operation.main in tracks,
             f"{file}: '{operation.main}', which operation {k} moves, is not tracked; name its id in the objects file.",
         )
-    intervals = find_all_intervals(tracks)
+    planned = planned_starts(scenario)
+    gross = {part: find_gross(track, assembly.solids[part]) for part, track in tracks.items()}
+    tracks = {part: PoseTrack(t[~gross[part]], T[~gross[part]]) for part, (t, T) in tracks.items()}
+
+    def arrange_log(intervals: RestIntervals) -> Arrangement:
+        return arrange(intervals, camera, assembly, planned, stated)
+
+    def arrange_tracks(tracks: Mapping[str, PoseTrack]) -> Arrangement:
+        folded = {part: fold_track(track, assembly.solids[part]).track for part, track in tracks.items()}
+        intervals = find_all_intervals(folded, assembly.solids)
+        if not all(intervals.values()):
+            raise NoMatchingOrder("a part never rests.")
+        return _arrange_identical(intervals, arrange_log, identical)[0]
+
+    folded = {part: fold_track(track, assembly.solids[part]) for part, track in tracks.items()}
+    intervals = find_all_intervals({part: each.track for part, each in folded.items()}, assembly.solids)
     for part, known in intervals.items():
         require(known, f"{file}: '{part}' never rests; give a log in which it lies still at its places.")
-    arrange_log = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     try:
-        arrangement = arrange_log(intervals)
+        arrangement, owned = _arrange_identical(intervals, arrange_log, identical)
     except NoMatchingOrder as error:
         raise InputError(f"{file}: {error}") from error
-    check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
+    other = check_arrangement(arrangement, arrange_tracks, tracks, models or {}, file)
+    tracks = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
     chosen = arrangement.order.intervals
@@ -89,6 +119,9 @@ def import_recording(
         if rest is not None:
             poses[k] = X @ rest.T
             covariance[k] = rest.mean.covariance + rest_error(camera, rest.mean)
+            for offset in (offsets or {}).get(assembly.operations[k].main, ()):
+                frames = int(np.sum((offset.t >= rest.begins) & (offset.t <= rest.ends)))
+                covariance[k] += min(1.0, frames / len(rest.mean.inlier)) ** 2 * offset.covariance
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
@@ -102,8 +135,37 @@ def import_recording(
         # The error of the camera pose is common to all observed poses.
         sharing = tuple(np.flatnonzero(observed).tolist())
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
-    unclear = list_doubts(intervals, arrangement, covariance, assembly)
-    return ImportedRecording(scenario, observation, arrangement, operations, unclear)
+    turned = {part: int(each.turned.sum()) for part, each in folded.items()}
+    wrong = {part: int(each.sum()) for part, each in gross.items()}
+    many = tuple(
+        f"{n} of {n + len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
+        for part, n in wrong.items()
+        if n > _MANY * (n + len(tracks[part].t))
+    )
+    doubts = (*other, *many, *list_doubts(intervals, arrangement, covariance, assembly))
+    return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, wrong, doubts)
+
+
+def _arrange_identical(
+    intervals: RestIntervals,
+    arrange_log: Callable[[RestIntervals], Arrangement],
+    identical: Sequence[Sequence[str]],
+) -> tuple[Arrangement, Mapping[str, str]]:
+    """Return the best arrangement of all ways in which identical parts may have their tracks, and part -> track."""
+    tried: list[tuple[Arrangement, Mapping[str, str]]] = []
+    failed: NoMatchingOrder | None = None
+    for way in list_choices(identical):
+        own = {part: way.get(part, part) for part in intervals}
+        try:
+            changed = {
+                part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()
+            }
+            tried.append((arrange_log(changed), own))
+        except NoMatchingOrder as error:
+            failed = failed or error
+    if not tried:
+        raise failed or NoMatchingOrder("the moves of the log are not the operations of the scenario.")
+    return min(tried, key=lambda each: each[0].wrong_mm)
 
 
 def planned_starts(scenario: Scenario) -> Poses:

@@ -1,40 +1,58 @@
-"""Convert the table of a log to times and poses in metres, camera from model, by the conventions of the camera file."""
+"""Convert the tables of a log to times and poses, camera from model, by the conventions of the camera file."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from apo_bench.errors import InputError, one_line, require, require_known
+from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording import log_columns
 from apo_bench.importers.recording.camera_file import Conventions
-from apo_bench.importers.recording.log_columns import LogColumn, find_column
+from apo_bench.importers.recording.log_columns import UNITS, LogColumn
 from apo_bench.importers.recording.log_tables import LogTable
-from apo_bench.importers.recording.tracks import LogRows
+from apo_bench.importers.recording.tracks import FARTHEST_M, FASTEST_S, NEAREST_M, SLOWEST_S, LogRows
 
 _LARGEST = 1e20  # of any number in a log
 _LENGTH_TOLERANCE = 0.02
 """The norm of a quaternion, an axis or a row of a matrix may differ from 1 by this."""
+_NO = ("0", "0.0", "false", "no", "n", "f", "lost", "none", "")  # cells of a column such as `valid` for a lost frame
+_EMPTY = ("", "nan", "none", "null")  # cells of a frame without a pose
+_FEWEST_GOOD = 0.5
+"""Least share of the cells of a column that are numbers, and of rotations that are rotations."""
 
 
 def read_rows(table: LogTable, how: Conventions) -> LogRows:
     """Read times, ids and poses from a table; poses keep the direction and the handedness of the file.
 
+    Rows whose cells are no finite numbers, whose rotation is none, or that a column marks as not valid, are lost.
+
     Raises:
-        InputError: A column is missing, twice or without a unit, or a cell is not a finite number.
+        InputError: A unit or the order of a quaternion is not stated, or most cells of a column are no numbers.
     """
-    ids, cells = _read_columns(table, how)
-    for name in log_columns.POSITION:
-        require(
-            name in cells, f"{table.file}: the column '{name}_mm' is missing; name it in `columns` of the camera file."
-        )
+    ids, cells, lost = _read_columns(table, how)
+    cells = _one_scene(table, cells, how)
+    kept = cells.pop("kept").astype(bool)
+    ids = [name for name, keep in zip(ids, kept, strict=True) if keep]
+    lost = lost[kept]
+    places = [place for place, keep in zip(table.places, kept, strict=True) if keep]
+    given = {column.meaning: column for column in table.columns if column is not None}
+    notes = [table.form]
+    position = np.column_stack([cells[name] for name in log_columns.POSITION])
+    scale, note = _length_unit(table, given, position, how)
+    notes += note
+    R, is_rotation, note_R = _read_rotations(table, given, cells, how)
+    notes.append(note_R)
     T = np.tile(np.eye(4), (len(ids), 1, 1))
-    T[:, :3, 3] = _stack(cells, log_columns.POSITION)
-    T[:, :3, :3], note = _read_rotations(table, cells, how)
-    return LogRows(ids, _read_times(table, ids, cells, how), T, table.places, [note])
+    t, note = _read_times(table, given, ids, cells, how)
+    lost |= ~(np.isfinite(position).all(axis=1) & is_rotation & np.isfinite(t))
+    T[:, :3, 3] = np.where(lost[:, None], 0.0, position * scale)
+    T[~lost, :3, :3] = R[~lost]
+    score = cells.get("score", np.zeros(len(ids)))
+    return LogRows(ids, t, T, lost, score, places, [*notes, *note])
 
 
 def orient(T: Array, how: Conventions) -> tuple[Array, list[str]]:
@@ -56,53 +74,37 @@ def mirror(axis: str) -> Array:
     return np.outer(flip, flip)
 
 
-def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[str, Array]]:
-    """Return the id of each row, and the other known columns by meaning, (n,), in m, rad, s."""
-    names = [name.strip().lower() for name in table.names]
-    renamed = {theirs.strip().lower(): ours for ours, theirs in how.columns.items()}
-    for theirs, ours in renamed.items():
-        place = f"{table.file}: the camera file, log.columns"
-        require_known("column", theirs, names, place=place)
-        require(find_column(ours), f"{place}: '{one_line(ours, 40)}' has no meaning; use names such as id, t_s, x_mm.")
-    ids = [table.file.stem] * len(table.rows)
+def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[str, Array], NDArray[np.bool_]]:
+    """Return the id of each row, the columns of numbers by meaning, (n,), as written, and the rows marked as lost."""
+    ids = [table.name] * len(table.rows)
     cells: dict[str, Array] = {}
-    for i, name in enumerate(names):
-        column = find_column(renamed.get(name, name))
+    lost = np.zeros(len(table.rows), dtype=np.bool_)
+    for i, column in enumerate(table.columns):
+        if column is None:
+            continue
         given = [row[i] for row in table.rows]
-        if column is not None and column.meaning == "id":
-            ids = [str(cell) for cell in given]
-        elif column is not None:
+        if column.meaning == "id":
+            ids = [str(cell).strip("/") for cell in given]
+        elif column.meaning in ("valid", "lost"):
+            no = np.array([str(cell).strip().lower() in _NO for cell in given])
+            lost |= no if column.meaning == "valid" else ~no
+        else:
             require(
                 column.meaning not in cells,
                 f"{table.file}: two columns mean '{column.meaning}'; keep one, or rename the other.",
             )
-            cells[column.meaning] = _finite_numbers(given, table, name) * _factor(table, column, how)
-    return ids, cells
+            cells[column.meaning] = _numbers(given, table, column)
+    return ids, cells, lost
 
 
-def _factor(table: LogTable, column: LogColumn, how: Conventions) -> float:
-    """Return the factor from the unit of a column to m, rad or s."""
-    quantity = log_columns.QUANTITIES.get(column.meaning)
-    if quantity is None:
-        return 1.0
-    factors = log_columns.UNITS[quantity]
-    unit = column.unit or getattr(how, quantity)
-    require(
-        unit in factors,
-        f"{table.file}: the unit of the column '{column.meaning}' is not known; end its name with one of "
-        f"_{', _'.join(factors)}, or state `{quantity}` in the camera file.",
-    )
-    return factors[unit]
-
-
-def _finite_numbers(cells: Sequence[Any], table: LogTable, column: str) -> Array:
-    """Return the cells of a column as numbers, (n,); raise InputError at a cell that is no finite number."""
+def _numbers(cells: Sequence[Any], table: LogTable, column: LogColumn) -> Array:
+    """Return the cells of a column as numbers, (n,), NaN where they are none; most of them must be numbers or empty."""
     numbers = np.array([_number(cell) for cell in cells])
-    wrong = np.flatnonzero(~(np.abs(numbers) <= _LARGEST))
-    if len(wrong):
-        place = f"{table.places[wrong[0]]}, column {one_line(column, 40)}"
-        given = one_line(str(cells[wrong[0]]), 40)
-        raise InputError(f"{place}: a finite number is needed, '{given}' was given; leave out such rows.")
+    numbers[~(np.abs(numbers) <= _LARGEST)] = np.nan
+    words = [i for i, cell in enumerate(cells) if np.isnan(numbers[i]) and str(cell).strip().lower() not in _EMPTY]
+    if len(words) > (1.0 - _FEWEST_GOOD) * len(cells):
+        given = one_line(str(cells[words[0]]), 40)
+        raise InputError(f"{table.places[words[0]]}, column {column.meaning}: a number is needed, '{given}' was given.")
     return numbers
 
 
@@ -114,22 +116,62 @@ def _number(cell: Any) -> float:
         return np.nan
 
 
-def _read_times(table: LogTable, ids: Sequence[str], cells: Mapping[str, Array], how: Conventions) -> Array:
-    """Return the time of each row, (n,), [s]: from its column, or from its image number and the image rate."""
-    if "seconds" in cells:
-        return cells["seconds"] + 1e-9 * cells.get("nanoseconds", np.zeros(len(ids)))
-    if "stamp" in cells:
-        # ROS writes a stamp in a single number as whole nanoseconds.
-        stamp = cells["stamp"]
-        return stamp * 1e-9 if (stamp == np.round(stamp)).all() else stamp
+def _one_scene(table: LogTable, cells: dict[str, Array], how: Conventions) -> dict[str, Array]:
+    """Return the columns of numbers of one scene of BOP results, with a mask of its rows as `kept`."""
+    kept = np.ones(len(table.rows), dtype=np.bool_)
+    if "scene" in cells:
+        scenes = np.unique(cells["scene"])
+        scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
+        require(
+            scene in scenes,
+            f"{table.file}: a recording is one scene, and the file holds "
+            f"{', '.join(f'{x:.0f}' for x in scenes[:6].tolist())}; state `scene` in the camera file.",
+        )
+        kept = cells["scene"] == scene
+    return {**{name: x[kept] for name, x in cells.items()}, "kept": kept.astype(np.float64)}
+
+
+def _length_unit(
+    table: LogTable, given: Mapping[str, LogColumn], position: Array, how: Conventions
+) -> tuple[float, list[str]]:
+    """Return the factor to metres: as the header or the camera file states, else as the distances suggest."""
+    unit = given["x"].unit or how.length
+    if unit:
+        return UNITS["length"][unit], [f"lengths in {unit}"]
+    distance = float(np.nanmedian(np.linalg.norm(position, axis=1))) if np.isfinite(position).any() else np.nan
+    fits = [unit for unit in ("m", "mm") if NEAREST_M <= distance * UNITS["length"][unit] <= FARTHEST_M]
+    require(
+        fits,
+        f"{table.file}: the unit of the column 'x' is not known; end its name with _mm, _cm or _m, or state `length` "
+        "in the camera file.",
+    )
+    return UNITS["length"][fits[0]], [f"lengths taken for {fits[0]}, as no unit is stated"]
+
+
+def _read_times(
+    table: LogTable, given: Mapping[str, LogColumn], ids: Sequence[str], cells: Mapping[str, Array], how: Conventions
+) -> tuple[Array, list[str]]:
+    """Return the time of each row, (n,), [s]: from its column, or from its image number and the rate of images."""
+    if "sec" in cells:
+        return cells["sec"] + 1e-9 * cells.get("nanosec", np.zeros(len(ids))), []
     if "t" in cells:
-        return cells["t"]
-    if how.rate_hz is None:
+        t = cells["t"]
+        unit = given["t"].unit or how.time
+        if unit:
+            return t * UNITS["time"][unit], []
+        # Rows of different objects may share a time, so steps within an object count.
+        names = np.array(ids, dtype=object)
+        steps = np.concatenate([np.diff(t[names == name]) for name in sorted({*ids})])
+        step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else SLOWEST_S
+        fits = [unit for unit, factor in UNITS["time"].items() if FASTEST_S <= step * factor <= SLOWEST_S]
+        return t * UNITS["time"][(fits or ["s"])[0]], [f"times taken for {fits[0]}"] if fits and fits[0] != "s" else []
+    rate = how.rate_hz or table.rate_hz
+    if not rate:
         raise InputError(
             f"{table.file}: the column of the time is missing, such as t_s; name it in `columns` of the camera file, "
             "or state `rate_hz` there for images at a constant rate."
         )
-    return (cells["frame"] if "frame" in cells else _count_images(ids)) / how.rate_hz
+    return (cells["frame"] if "frame" in cells else _count_images(ids)) / rate, [f"{rate:g} images a second"]
 
 
 def _count_images(ids: Sequence[str]) -> Array:
@@ -152,55 +194,63 @@ def _count_images(ids: Sequence[str]) -> Array:
     return np.array(images, dtype=np.float64)
 
 
-def _read_rotations(table: LogTable, cells: Mapping[str, Array], how: Conventions) -> tuple[Array, str]:
-    """Return rotation matrices, (n, 3, 3), and a note on the convention that was used."""
-    found = [names for names in log_columns.ROTATIONS if cells.keys() >= set(names)]
-    require(
-        len(found) == 1,
-        f"{table.file}: the columns of one rotation are needed, {len(found)} are complete; allowed are qw to qz, q0 to "
-        "q3, rx to rz, ax to az with angle, roll, pitch and yaw, e1 to e3, or r11 to r33.",
-    )
-    names = found[0]
-    values = _stack(cells, names)
+def _read_rotations(
+    table: LogTable, given: Mapping[str, LogColumn], cells: Mapping[str, Array], how: Conventions
+) -> tuple[Array, NDArray[np.bool_], str]:
+    """Return rotation matrices, (n, 3, 3), which rows hold one, (n,), and a note on the convention that was used."""
+    names = next(names for names in log_columns.ROTATIONS if cells.keys() >= {*names})
+    values = np.column_stack([cells[name] * _angle_unit(table, given[name], how) for name in names])
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
+    values = np.where(finite[:, None], values, 0.0)
     if names == log_columns.MATRIX:
         R = values.reshape(-1, 3, 3)
         skew = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-        _refuse((skew > _LENGTH_TOLERANCE) | (np.linalg.det(R) < 0.0), table, "a rotation matrix, row by row")
-        return pose.nearest_rotations(R), "rotation matrices, row by row"
+        good = (skew <= _LENGTH_TOLERANCE) & (np.linalg.det(R) > 0.0)
+        _check_share(good, finite, table, "a rotation matrix, row by row")
+        return (
+            pose.nearest_rotations(np.where(good[:, None, None], R, np.eye(3))),
+            good,
+            "rotation matrices, row by row",
+        )
     if names in (log_columns.QUATERNION, log_columns.NUMBERED_QUATERNION):
         order = "wxyz" if names == log_columns.QUATERNION else how.quaternion
         require(order, f'{table.file}: q0 to q3 have no stated order; state `quaternion = "wxyz"` in the camera file.')
-        _check_unit_length(values, table, "a quaternion")
-        return Rotation.from_quat(values, scalar_first=order == "wxyz").as_matrix(), f"quaternions as {order}"
+        good = _has_unit_length(values, finite, table, "a quaternion of length 1")
+        safe = np.where(good[:, None], values, 1.0)
+        return Rotation.from_quat(safe, scalar_first=order == "wxyz").as_matrix(), good, f"quaternions as {order}"
     if names == log_columns.ROTATION_VECTOR:
-        return Rotation.from_rotvec(values).as_matrix(), "rotation vectors"
+        return Rotation.from_rotvec(values).as_matrix(), finite, "rotation vectors"
     if names == log_columns.AXIS_AND_ANGLE:
-        _check_unit_length(values[:, :3], table, "an axis")
-        return Rotation.from_rotvec(values[:, :3] * values[:, 3:]).as_matrix(), "axis and angle"
+        good = _has_unit_length(values[:, :3], finite, table, "an axis of length 1")
+        return Rotation.from_rotvec(values[:, :3] * values[:, 3:]).as_matrix(), good, "axis and angle"
     if how.euler is None:
         raise InputError(f'{table.file}: Euler angles have no stated order; state `euler = "xyz"` in the camera file.')
-    return Rotation.from_euler(how.euler, values).as_matrix(), f"Euler angles as {how.euler}"
+    return Rotation.from_euler(how.euler, values).as_matrix(), finite, f"Euler angles as {how.euler}"
 
 
-def _stack(cells: Mapping[str, Array], names: Sequence[str]) -> Array:
-    """Return the named columns side by side, (n, k)."""
-    return np.column_stack([cells[name] for name in names])
+def _angle_unit(table: LogTable, column: LogColumn, how: Conventions) -> float:
+    """Return the factor from the unit of a column to radians; 1 for a column that is no angle."""
+    if log_columns.QUANTITIES.get(column.meaning) != "angle":
+        return 1.0
+    unit = column.unit or how.angle
+    if not unit:
+        raise InputError(
+            f"{table.file}: the unit of the column '{column.meaning}' is not known; end its name with _deg or _rad, or "
+            "state `angle` in the camera file."
+        )
+    return UNITS["angle"][unit]
 
 
-def _check_unit_length(vectors: Array, table: LogTable, kind: str) -> None:
-    """Raise InputError unless vectors, (n, k), have length 1.
+def _has_unit_length(vectors: Array, finite: NDArray[np.bool_], table: LogTable, needed: str) -> NDArray[np.bool_]:
+    """Return which vectors, (n, k), have length 1; most of those that are not zero must."""
+    length = np.linalg.norm(vectors, axis=1)
+    good = np.abs(length - 1.0) <= _LENGTH_TOLERANCE
+    _check_share(good, finite & (length > 0.0), table, needed)
+    return np.asarray(good)
 
-    Args:
-        kind: Name of such a vector, for the message.
-    """
-    _refuse(np.abs(np.linalg.norm(vectors, axis=1) - 1.0) > _LENGTH_TOLERANCE, table, f"{kind} of length 1")
 
-
-def _refuse(wrong: Array, table: LogTable, needed: str) -> None:
-    """Raise InputError at the first wrong row of a mask, (n,).
-
-    Args:
-        needed: What the message asks for.
-    """
-    if wrong.any():
+def _check_share(good: NDArray[np.bool_], counted: NDArray[np.bool_], table: LogTable, needed: str) -> None:
+    """Raise InputError at the first wrong row if fewer than half of the counted rows are right."""
+    wrong = counted & ~good
+    if wrong.sum() > (1.0 - _FEWEST_GOOD) * max(counted.sum(), 1):
         raise InputError(f"{table.places[int(np.argmax(wrong))]}: {needed} is needed.")

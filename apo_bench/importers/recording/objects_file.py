@@ -1,26 +1,22 @@
-"""Read OBJECTS.toml: the id of each part in the log, and the pose of the part's frame in the tracker's model."""
+"""Read OBJECTS.toml: the ids of each part in the log, and the pose of the part's frame in the tracker's model."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple, final
+from typing import Any, Literal, NamedTuple, final
 
-from apo_bench.errors import one_line, require, require_known
-from apo_bench.geometry import Array
+from apo_bench.errors import require
+from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.camera_file import NamedEntries
-from apo_bench.importers.recording.tracks import Log, PoseTrack
 from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
-
-_MOST_IDS = 12
-"""Largest number of ids that an error names."""
 
 
 class ObjectTable(FileTable, frozen=True, kw_only=True):
     """The table of one part; ids are texts, or whole numbers as in BOP files."""
 
-    id: str | int
-    frame: AnyPose = AnyPose(at_mm=(0.0, 0.0, 0.0))
+    id: str | int | list[str | int]
+    frame: AnyPose | None = None
 
 
 class ObjectsTable(FileTable, frozen=True, kw_only=True):
@@ -32,11 +28,13 @@ class ObjectsTable(FileTable, frozen=True, kw_only=True):
 
 
 class TrackedPart(NamedTuple):
-    """The id of a part in the log, and its frame in the tracker's model."""
+    """The ids of a part in the log, and its frame in the tracker's model."""
 
-    id: str
+    ids: tuple[str, ...]
     T_model_part: Array
-    """(4, 4), model from part, [m]."""
+    """(4, 4), model of the first id from part, [m]."""
+    others: Mapping[str, Array]
+    """Other id -> its frame, as stated; the frames of the rest are solved."""
 
 
 @final
@@ -62,34 +60,41 @@ def read_objects(path: str | Path) -> ObjectsFile:
         InputError: A key or value is wrong; the message names it.
     """
     top = read_typed(path, ObjectsTable, "objects file")
-    parts: dict[str, TrackedPart] = {}
-    for part, value in top.objects.items():
-        place = f"{path}, objects, {part}"
-        stated = convert_typed(value, ObjectTable, place)
-        require(
-            all(tracked.id != str(stated.id) for tracked in parts.values()),
-            f"{place}: the id '{stated.id}' is that of another part already.",
-        )
-        parts[part] = TrackedPart(str(stated.id), stated.frame.matrix(f"{place}, frame"))
+    parts = {part: _read_part(value, f"{path}, objects, {part}") for part, value in top.objects.items()}
     return ObjectsFile(str(path), parts, frozenset(map(str, top.ignore)))
 
 
-def name_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
-    """Return the track of each part, camera from part.
+def _read_part(value: Any, place: str) -> TrackedPart:
+    """Read the table of a part, or a list of tables, one for each of its tags."""
+    ids: list[str] = []
+    frames: dict[str, Array] = {}
+    for each in value if isinstance(value, list) else [value]:
+        stated = convert_typed(each, ObjectTable, place)
+        own = [str(name) for name in (stated.id if isinstance(stated.id, list) else [stated.id])]
+        require(own, f"{place}: an id of the log is needed.")
+        ids += own
+        if stated.frame is not None:
+            frames[own[0]] = stated.frame.matrix(f"{place}, frame")
+    require(len(ids) == len({*ids}) and ids, f"{place}: an id stands twice, or none is given.")
+    return TrackedPart(tuple(ids), frames.pop(ids[0], pose.at((0.0, 0.0, 0.0))), frames)
 
-    Raises:
-        InputError: An id of the log is no part, or a part is not in the log.
+
+def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
+    """Return the objects in which an entry such as `stick_tag2` counts as another id of the part `stick`.
+
+    Args:
+        known: Parts of the scenario; other entries are of the part with whose name theirs begins.
     """
-    known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
-    strange = [f"'{one_line(name, 60)}'" for name in log.tracks if name not in known]
-    require(
-        not strange,
-        f"{log.file}: the id {', '.join(strange[:_MOST_IDS])} is no part; name its part in {objects.file}, or add it "
-        f"to its key `ignore`. Known: {', '.join(sorted(known))}.",
-    )
-    tracks: dict[str, PoseTrack] = {}
-    for part, tracked in objects.parts.items():
-        require_known("id", tracked.id, log.tracks, place=f"{objects.file}, {part}")
-        t, T = log.tracks[tracked.id]
-        tracks[part] = PoseTrack(t, T @ tracked.T_model_part)
-    return tracks
+    parts = {part: tracked for part, tracked in objects.parts.items() if part in known}
+    for name, tracked in objects.parts.items():
+        of = [part for part in parts if name.startswith(f"{part}_")]
+        if name in parts or not of:
+            parts.setdefault(name, tracked)
+            continue
+        part = max(of, key=len)
+        ids = (*parts[part].ids, *tracked.ids)
+        stated = (
+            {} if (tracked.T_model_part == pose.at((0.0, 0.0, 0.0))).all() else {tracked.ids[0]: tracked.T_model_part}
+        )
+        parts[part] = TrackedPart(ids, parts[part].T_model_part, {**parts[part].others, **stated, **tracked.others})
+    return ObjectsFile(objects.file, parts, objects.ignored)

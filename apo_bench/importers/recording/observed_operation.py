@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import Array, pose
+from apo_bench.importers.recording.folding import fold_to
 from apo_bench.importers.recording.ordering import end_of_operation, time_taken
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 from apo_bench.importers.recording.rests import Rest
@@ -50,7 +51,10 @@ def observed_operation(
     begins = time_taken(assembly, intervals, chosen[:k], interval)
     track = tracks[operation.main]
     among = (track.t >= begins) & (track.t <= rest.begins)
-    path = PoseTrack(track.t[among], T_world_camera @ track.T[among])
+    seen = track.T[among]
+    if len(seen):  # the image of the rest
+        seen = seen @ pose.inverse(seen[-1]) @ fold_to(assembly.solids[operation.main], seen[-1], rest.T)
+    path = PoseTrack(track.t[among], T_world_camera @ seen)
     # Poses before this operation include what earlier operations put, even if their part came to rest after this start.
     before = find_rest_poses(
         intervals, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
@@ -63,6 +67,9 @@ def observed_operation(
         for part in operation.carries
         if part in before
     }
-    others = {part: pose.log(pose.inverse(T) @ after[part]) for part, T in before.items() if part != operation.main}
-    adjusted = {part: twist for part, twist in others.items() if part not in carried and twist.any()}
+    # What moves a part before its own operations have ended is no error of where they left it.
+    placed = assembly.fixed | {part for earlier in assembly.operations[:k] for part in earlier.moves}
+    placed = placed & before.keys() - {operation.main, *carried}
+    twists = {part: pose.log(pose.inverse(before[part]) @ after[part]) for part in sorted(placed)}
+    adjusted = {part: twist for part, twist in twists.items() if twist.any()}
     return LoggedOperation(interval, rest, path, carried, adjusted)

@@ -14,6 +14,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.contact_fit import contact_fit
+from apo_bench.importers.recording.folding import list_images
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _LONG_S = 1.0  # seconds beyond which a longer interval is not worth more
@@ -21,7 +22,10 @@ _WIDE_MM = 50.0  # misfit beyond which a contact is not worse
 """The worth of an interval is its seconds, up to 1, less 1 for each 10 mm of misfit, up to 5."""
 _LEFT_OVER = 5.0
 """Penalty for each interval that no operation explains."""
-_OVERLAP_S = 0.3
+_LOST_S = 0.5  # a part that is seen at rest no more this long before the end of the log was lost, or not put down
+_SKIPPED = 8.0
+"""Penalty for an operation that nobody saw, as its part was hidden."""
+_OVERLAP_S = 0.5
 """An operation may take its part this much earlier than the part of the previous operation comes to rest."""
 _CLOSE = 0.3
 """A second choice whose worth differs by less is a rival."""
@@ -57,7 +61,7 @@ class _Choice(NamedTuple):
 
     worth: float
     begins: float
-    """Begin of the last interval, [s]."""
+    """Begin of the last interval, [s]; the earliest time, if its part was hidden before."""
     intervals: Chosen
 
 
@@ -81,8 +85,9 @@ def find_order(
     def worth(k: int, interval: RestInterval) -> float:
         """Return the worth of an interval as the end of operation k."""
         known = intervals[interval.part]
-        poses = {part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}
-        wrong_mm = contact_fit(assembly, k, {**start, **poses}).wrong_mm
+        poses = {**start, **{part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}}
+        images = list_images(assembly.solids[interval.part], poses[interval.part])
+        wrong_mm = min(contact_fit(assembly, k, {**poses, interval.part: T}).wrong_mm for T in images)
         is_carried_later = any(interval.part in other.carries for other in assembly.operations[k + 1 :])
         is_last = last[interval.part] == k and not is_carried_later
         left = len(known) - 1 - known.index(interval) if is_last else 0  # later intervals that no operation explains
@@ -147,8 +152,15 @@ def _best_choices(
                     # Intervals that contradict the order.
                     amiss = moved_on + _strangers(intervals, operation.moves, choice.begins, interval)
                     value = choice.worth + worth(k, interval) - _LEFT_OVER * amiss
-                    longer = _Choice(value, interval.begins, (*choice.intervals, interval))
+                    longer = _Choice(value, max(choice.begins, interval.came), (*choice.intervals, interval))
                     by_end.setdefault(interval, []).append(longer)
+        own = intervals[operation.main]
+        is_lost = own[-1].ends < max(known[-1].ends for known in intervals.values()) - _LOST_S
+        if is_lost or any(each.gone > each.ends or each.came < each.begins for each in own):
+            # The part may have come to rest and gone again while it was hidden.
+            skipped = [_Choice(c.worth - _SKIPPED, c.begins, (*c.intervals, None)) for c in choices]
+            choices = [*(each for ending in by_end.values() for each in _best_two(ending)), *_best_two(skipped)]
+            continue
         if not by_end:
             rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
             raise NoMatchingOrder(
@@ -175,7 +187,7 @@ def _strangers(intervals: RestIntervals, moved: Collection[str], t: float, until
         until: The interval that ends the operation.
     """
     return sum(
-        any(t + _OVERLAP_S < other.begins < until.begins + _OVERLAP_S for other in known[1:])
+        any(t + _OVERLAP_S < other.came and other.begins < until.begins + _OVERLAP_S for other in known[1:])
         for part, known in intervals.items()
         if part not in moved
     )
@@ -233,6 +245,6 @@ def _moves_between(assembly: Assembly, intervals: RestIntervals, before: Chosen,
     if last is None:
         return 0
     t = time_taken(assembly, intervals, before, interval)
-    if last.begins > t + _OVERLAP_S:
+    if last.came > t + _OVERLAP_S:
         return None
     return sum(last.begins < other.begins < t - _OVERLAP_S for other in intervals[last.part])

@@ -1,12 +1,13 @@
 """Group rests between which a part is only adjusted into one interval at one place."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, Solid, pose
+from apo_bench.importers.recording.folding import forget_turn
 from apo_bench.importers.recording.rests import Rest, find_rests, group_consecutive
 from apo_bench.importers.recording.tracks import PoseTrack
 
@@ -37,6 +38,11 @@ class RestInterval:
         return self.rests[-1].gone
 
     @property
+    def came(self) -> float:
+        """The time from which on the part may have been there, [s]: when it was last observed, if it was hidden."""
+        return self.rests[0].came
+
+    @property
     def seconds(self) -> float:
         """Total duration of the rests, [s]."""
         return sum(rest.ends - rest.begins for rest in self.rests)
@@ -45,9 +51,13 @@ class RestInterval:
         """Return the last rest that begins at or before a time, [s]; the first rest if there is none."""
         return next((rest for rest in reversed(self.rests) if rest.begins <= t), self.rests[0])
 
-    def change(self, change: Callable[[Array], Array]) -> "RestInterval":
-        """Return the interval with `change` applied to the pose of each rest, (4, 4)."""
-        rests = [replace(rest, mean=replace(rest.mean, T=change(rest.T))) for rest in self.rests]
+    def turn(self, g: Array) -> "RestInterval":
+        """Return the interval with the image T g in place of each pose T."""
+        A = pose.adjoint(pose.inverse(g))  # a body twist xi at T is Ad(g^-1) xi at T g
+        rests = [
+            replace(rest, mean=replace(rest.mean, T=rest.T @ g, scatter=A @ rest.mean.scatter @ A.T))
+            for rest in self.rests
+        ]
         return replace(self, rests=tuple(rests))
 
 
@@ -55,9 +65,21 @@ RestIntervals = Mapping[str, tuple[RestInterval, ...]]
 """Part -> its rest intervals in order of time."""
 
 
-def find_all_intervals(tracks: Mapping[str, PoseTrack]) -> RestIntervals:
-    """Return the rest intervals of every part; an empty tuple for a part that never rests."""
-    return {part: find_intervals(part, find_rests(track)) for part, track in tracks.items()}
+def find_all_intervals(tracks: Mapping[str, PoseTrack], solids: Mapping[str, Solid] | None = None) -> RestIntervals:
+    """Return the rest intervals of every part; an empty tuple for a part that never rests.
+
+    Args:
+        tracks: Folded tracks.
+        solids: Shapes of parts, of which those of revolution have no known turn about their axis.
+    """
+    known = {part: find_rests(track) for part, track in tracks.items()}
+    for part, rests in known.items():
+        if solids and part in solids:
+            known[part] = tuple(
+                replace(rest, mean=replace(rest.mean, scatter=forget_turn(solids[part], rest.mean.scatter)))
+                for rest in rests
+            )
+    return {part: find_intervals(part, rests) for part, rests in known.items()}
 
 
 def find_intervals(part: str, rests: Sequence[Rest]) -> tuple[RestInterval, ...]:

@@ -52,6 +52,8 @@ class Rest:
     gone: float
     """The time until which the part may have been there, [s]: later than `ends` if it was hidden afterwards."""
     mean: Mean
+    came: float = -np.inf
+    """The time from which on the part may have been there, [s]: earlier than `begins` if it was hidden before."""
 
     @property
     def T(self) -> Array:
@@ -87,8 +89,10 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
     for (a, b), mean in zip(spans, means, strict=True):
         # The last frames of a rest may be trimmed by chance, so a gap may begin a few frames after its end.
         seen_again = [float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride]
+        seen_before = [float(track.t[i]) for i in last_seen if a - 2 * stride <= i + 1 <= a]
         begins, ends_s = float(track.t[a]), float(track.t[b])
-        rests.append(Rest(a, b, begins, ends_s, max(seen_again, default=ends_s), pool_mean(mean, common)))
+        gone = max(seen_again, default=ends_s)
+        rests.append(Rest(a, b, begins, ends_s, gone, pool_mean(mean, common), min(seen_before, default=begins)))
     return tuple(rests)
 
 

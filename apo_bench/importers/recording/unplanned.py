@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from apo_bench.errors import require
 from apo_bench.importers.recording.camera_file import CameraFile
-from apo_bench.importers.recording.camera_pose import CameraPose, find_camera
+from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_all_intervals
 from apo_bench.importers.recording.rests import Rest, group_consecutive
 from apo_bench.importers.recording.tracks import PoseTrack
@@ -44,7 +44,7 @@ def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, fil
     intervals = find_all_intervals(tracks)
     # Without a scenario no part starts at a planned place.
     known = {part: T for part, T in camera.known.items() if T is not None}
-    found = find_camera(intervals, CameraFile(camera.conventions, camera.T_world_camera, known, camera.stays), {})
+    found = find_cameras(intervals, CameraFile(camera.conventions, camera.T_world_camera, known, camera.stays), {})[0]
     moves = [_Move(before.ends, after) for known in intervals.values() for before, after in pairwise(known)]
     require(moves, f"{file}: no part comes to rest at another place than before, so there is no operation.")
     moves.sort(key=lambda move: move.to.begins)

@@ -1,4 +1,4 @@
-"""Every way in which the log of a pose tracker may be written, with the camera and objects files that belong to it."""
+"""Conventions in which the log of a pose tracker may be written, with what the camera file has to say about them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Array, pose
-
-RATE_HZ = 30.0
 
 
 class Tracked(NamedTuple):
@@ -51,35 +49,8 @@ def _csv(
     return write
 
 
-def _csv_files(found: Mapping[str, Tracked], path: Path) -> None:
-    path.mkdir()
-    for one in found.values():
-        packed = pose.pack(one.T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]
-        rows = [",".join(f"{x:.9g}" for x in (t, *row)) for t, row in zip(one.t, packed, strict=True)]
-        text = "\n".join(["t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows]) + "\n"
-        (path / f"{one.id}.csv").write_text(text, encoding="utf-8")
-
-
 def _with(scale: float, rotation: Callable[[Rotation], Array]) -> Callable[[Array], Array]:
     return lambda T: np.concatenate([T[:3, 3] * scale, np.ravel(rotation(Rotation.from_matrix(T[:3, :3])))])
-
-
-def _bop(found: Mapping[str, Tracked], path: Path) -> None:
-    rows = []
-    for t, name, T in _rows(found):
-        R, at = (" ".join(f"{x:.8g}" for x in np.ravel(numbers)) for numbers in (T[:3, :3], T[:3, 3] * 1e3))
-        rows.append(f"1,{round(t * RATE_HZ)},{name},0.9,{R},{at},0.03")
-    path.write_text("\n".join(["scene_id,im_id,obj_id,score,R,t,time", *rows]) + "\n", encoding="utf-8")
-
-
-def _tum(found: Mapping[str, Tracked], path: Path) -> None:
-    path.mkdir()
-    for one in found.values():
-        packed = pose.pack(one.T)[:, [0, 1, 2, 4, 5, 6, 3]]
-        lines = [" ".join(f"{x:.9g}" for x in (t, *row)) for t, row in zip(one.t, packed, strict=True)]
-        (path / f"{one.id}.txt").write_text(
-            "# timestamp tx ty tz qx qy qz qw\n" + "\n".join(lines) + "\n", encoding="utf-8"
-        )
 
 
 def _ros_csv(found: Mapping[str, Tracked], path: Path) -> None:
@@ -91,19 +62,6 @@ def _ros_csv(found: Mapping[str, Tracked], path: Path) -> None:
     ]
     head = "header.stamp.sec,header.stamp.nanosec,header.frame_id,child_frame_id," + ",".join(names)
     path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-
-
-def _ros_csv_files(found: Mapping[str, Tracked], path: Path) -> None:
-    path.mkdir()
-    names = [f"field.pose.position.{a}" for a in "xyz"] + [f"field.pose.orientation.{a}" for a in "xyzw"]
-    for one in found.values():
-        packed = pose.pack(one.T)[:, [0, 1, 2, 4, 5, 6, 3]]
-        rows = [
-            f"{round(t * 1e9)},{round(t * 1e9)},camera," + ",".join(f"{x:.9g}" for x in row)
-            for t, row in zip(one.t, packed, strict=True)
-        ]
-        text = "\n".join([",".join(["%time", "field.header.stamp", "field.header.frame_id", *names]), *rows]) + "\n"
-        (path / f"{one.id}.csv").write_text(text, encoding="utf-8")
 
 
 def _stamp(t: float) -> dict[str, object]:
@@ -141,7 +99,6 @@ FORMS: Mapping[str, Form] = {
     "csv-xyzw": Form(
         "csv", "log.csv", 'quaternion = "xyzw"', _csv("x_m,y_m,z_m,q0,q1,q2,q3", _with(_M, lambda R: R.as_quat()))
     ),
-    "csv-files": Form("csv", "log", "", _csv_files),
     "csv-rotvec": Form(
         "csv",
         "log.csv",
@@ -181,10 +138,7 @@ FORMS: Mapping[str, Form] = {
             1e3,
         ),
     ),
-    "bop": Form("bop", "log.csv", f"rate_hz = {RATE_HZ:g}", _bop),
-    "tum": Form("tum", "log", "", _tum),
     "ros-csv": Form("ros-csv", "log.csv", "", _ros_csv),
-    "ros-csv-files": Form("ros-csv", "log", "", _ros_csv_files),
     "ros-json": Form("ros-json", "log.jsonl", "", _ros_json),
     "ros-tf": Form("ros-json", "log.json", "", _ros_tf),
 }

@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.averaging import Mean
-from apo_bench.importers.recording.camera_pose import CameraPose, solve_camera
+from apo_bench.importers.recording.camera_pose import CameraPose, solve_cameras
 from tests.recorded import CAMERA
 
 KNOWN = {"a": pose.at((0.1, 0.0, 0.02), (0.0, 0.0, 30.0)), "b": pose.at((-0.1, 0.2, 0.05), (90.0, 0.0, 0.0))}
@@ -18,7 +18,7 @@ def solved(off: Array) -> CameraPose:
     seen = {part: pose.inverse(CAMERA) @ T for part, T in KNOWN.items()}
     seen["b"] = seen["b"] @ pose.exp(off)
     means = {part: Mean(T, SIZE, np.ones(20, dtype=np.bool_), 20.0) for part, T in seen.items()}
-    return solve_camera(KNOWN, means, 0.0 * SIZE)
+    return solve_cameras(KNOWN, means, 0.0 * SIZE)[0]
 
 
 def test_places_that_disagree_make_the_camera_unsure() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
 from apo_bench.formats.bop import read_results
+from apo_bench.formats.bop_models import find_models_info, read_symmetries
 from apo_bench.formats.bop_truth import read_truth
 from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit, fit_noise
 from apo_bench.perception.observation.models.empirical import format_residuals
@@ -96,6 +98,25 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
         assert_allclose([*mine.across, *mine.along], [*known.across, *known.along], rtol=0.1)
     assert all(figures.distance < 1.2 * figures.by_chance for figures in compute_goodness_of_fit(residuals, measured))
     assert fit_form(residuals, measured, compute_goodness_of_fit(residuals, measured))["round_objects"] == [3]
+
+
+def test_estimates_are_folded_by_the_symmetries_of_the_models(tmp_path: Path) -> None:
+    """Each estimate is turned by a symmetry about an axis off the origin: all are as good as the upright ones."""
+    rng = np.random.default_rng(4)
+    drawn = made_of.draw(300, Known(missed=0.0, outliers=0.0), rng, objects=1)
+    plain = compared_files(*made_of.files(tmp_path, drawn))
+    half = np.diag([-1.0, -1.0, 1.0, 1.0])
+    half[0, 3] = 60.0  # the axis is 30 mm beside the origin
+    info = {"1": {"symmetries_discrete": [half.ravel().tolist()]}}
+    (tmp_path / "models_info.json").write_text(json.dumps(info), encoding="utf-8")
+    turned = drawn._replace(R_seen=drawn.R_seen @ half[:3, :3], t_seen=drawn.t_seen + drawn.R_seen @ half[:3, 3])
+    estimates, truth = made_of.files(tmp_path, turned)
+    found = find_models_info(truth)
+    assert found is not None
+    seen = read_results(estimates)
+    folded = match_residuals(seen, read_truth(truth, seen), read_symmetries(found))
+    assert_allclose(folded.shift_mm, plain.shift_mm, atol=1e-4)
+    assert_allclose(folded.turn_deg, plain.turn_deg, atol=1e-4)
 
 
 @pytest.fixture(scope="module")

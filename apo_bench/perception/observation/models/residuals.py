@@ -1,6 +1,6 @@
 """Residuals of a pose estimator: match its estimates to the truth, and express errors in the frames of camera rays."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
 from apo_bench.formats.bop import PoseRows
+from apo_bench.formats.bop_models import ObjectSymmetry
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 
@@ -109,16 +110,22 @@ class Residuals:
         return np.asarray(np.linalg.norm(self.turn_deg, axis=1))
 
 
-def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
+def match_residuals(
+    estimates: PoseRows, truth: PoseRows, symmetries: Mapping[int, ObjectSymmetry] | None = None
+) -> Residuals:
     """Match estimates to the truth and compute their errors; estimates in images without truth are ignored.
 
     Per image and object, parts and estimates are assigned with the least sum of distances (Hungarian method). There is
     no limit of distance, and scores are ignored; `INLIER_MM` marks outliers afterwards. Matrices in the files are
     replaced by the nearest rotations.
+
+    Args:
+        symmetries: Object -> displacements after which it looks the same; estimates become the images nearest to the
+            truth. None: symmetries are found from the estimates where possible.
     """
     from scipy.spatial.transform import Rotation
 
-    partner = match_rows(estimates, truth)
+    partner = match_rows(estimates, truth, symmetries or {})
     is_estimated = partner >= 0
     n = len(partner)
     in_images = _occurs_in(estimates.where[:, :2], truth.where[:, :2])
@@ -127,12 +134,12 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[is_estimated]
     R = truth.R[is_estimated]
-    R_obs = estimates.R[partner[is_estimated]]
+    R_obs, t_obs = _fold(estimates, partner[is_estimated], R, symmetries or {})
     right = pose.nearest_rotations(R)
     turn = Rotation.from_matrix(pose.nearest_rotations(R_obs) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
-    moved = estimates.t_mm[partner[is_estimated]] - truth.t_mm[is_estimated]
+    moved = t_obs - truth.t_mm[is_estimated]
     turned_in_place, moved = _find_turned_in_place(
         truth.where[is_estimated, 2], moved, right, pose.nearest_rotations(R_obs)
     )
@@ -217,7 +224,37 @@ def _occurs_in(rows: Any, known: Any) -> NDArray[np.bool_]:
     return np.isin(key[len(known) :], key[: len(known)])
 
 
-def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
+def _fold(
+    estimates: PoseRows, rows: NDArray[np.int64], R: Array, symmetries: Mapping[int, ObjectSymmetry]
+) -> tuple[Array, Array]:
+    """Return rotations and positions, [mm], of estimates, each at the image that is turned least from the truth.
+
+    Args:
+        rows: (n,), rows of the estimates.
+        R: (n, 3, 3), true rotations.
+    """
+    R_obs = np.array(estimates.R[rows])
+    t_obs = np.array(estimates.t_mm[rows])
+    for i, row in enumerate(rows):
+        known = symmetries.get(int(estimates.where[row, 2]))
+        if known is not None:
+            g = known.images[np.einsum("ji,jk,mki->m", R[i], R_obs[i], known.images[:, :3, :3]).argmax()]
+            t_obs[i] = R_obs[i] @ g[:3, 3] + t_obs[i]
+            R_obs[i] = R_obs[i] @ g[:3, :3]
+    return R_obs, t_obs
+
+
+def _distances(estimates: PoseRows, seen: NDArray[np.int64], truth: Array, symmetry: ObjectSymmetry | None) -> Array:
+    """Return the distances of true positions, (n, 3), to the nearest images of estimates, (n, k), [mm]."""
+    places = estimates.t_mm[seen][:, None]
+    if symmetry is not None:
+        places = places + np.einsum("kij,mj->kmi", estimates.R[seen], symmetry.images[:, :3, 3])
+    return np.asarray(np.linalg.norm(truth[:, None, None] - places[None], axis=3).min(axis=2))
+
+
+def match_rows(
+    estimates: PoseRows, truth: PoseRows, symmetries: Mapping[int, ObjectSymmetry] | None = None
+) -> NDArray[np.int64]:
     """The index (n,) of the estimate matched to each row of the truth, -1 if there is none."""
     from scipy.optimize import linear_sum_assignment
 
@@ -225,7 +262,8 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     for there, seen in _group_rows(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
             raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
-        i, j = linear_sum_assignment(np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2))
+        symmetry = (symmetries or {}).get(int(truth.where[there[0], 2]))
+        i, j = linear_sum_assignment(_distances(estimates, seen, truth.t_mm[there], symmetry))
         partner[there[i]] = seen[j]
     return partner
 

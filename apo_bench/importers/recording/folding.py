@@ -1,0 +1,165 @@
+"""Fold the poses of a track to the nearest image under the symmetries of its part.
+
+A tracker cannot tell poses apart at which a part looks the same, so it reports any of them: another in each frame, in
+blocks, or from some frame on. Folding follows the part: each pose becomes the image that is turned least from the poses
+just before it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import (
+    Array,
+    Solid,
+    find_nearest_equivalent_pose,
+    find_revolution,
+    find_symmetries,
+    make_rotation_about_axis,
+    pose,
+)
+from apo_bench.importers.recording.tracks import PoseTrack
+
+_BEFORE = 5
+"""A pose is folded to the one of so many poses before it from which the others are turned least."""
+_AROUND = 4  # frames before and after one that tell whether it is gross
+_FEW = 0.03  # a smaller share of gross frames is left to the robust means of rests
+_GROSS_M = 0.03  # smallest distance of a gross frame
+_M_PER_RAD = 0.03  # a turn by a radian counts like this distance
+_TURNED = np.cos(np.radians(3.0))
+"""A pose counts as folded if its image is turned by more than this, as a cosine."""
+
+
+class FoldedTrack(NamedTuple):
+    """A track whose poses are images of those in the log."""
+
+    track: PoseTrack
+    turned: NDArray[np.bool_]
+    """(n,), frames with another image than most frames; about an axis of revolution, those turned by 3 degrees."""
+
+
+def find_gross(track: PoseTrack, solid: Solid) -> NDArray[np.bool_]:
+    """Return which frames, (n,), are far from the frames around them (Hampel filter); images count as one pose.
+
+    A frame is gross if it is farther than 30 mm, where a radian counts like 30 mm, and than four times the median
+    distance of the frames around, from the one among them that is nearest to all.
+    """
+    n = len(track.t)
+    if n < 2 * _AROUND + 1:
+        return np.zeros(n, dtype=np.bool_)
+    window = np.clip(np.arange(n)[:, None] + np.arange(-_AROUND, _AROUND + 1), 0, n - 1)
+    T = track.T[window]
+    p = T[:, :, :3, 3]
+    apart = np.linalg.norm(p[:, :, None] - p[:, None], axis=-1)
+    apart = apart + _M_PER_RAD * turn_between(solid, T[:, :, None], T[:, None])
+    middle = np.median(apart, axis=2).argmin(axis=1)
+    rows = np.arange(n)
+    usual = np.median(apart[rows, middle], axis=1)
+    gross = apart[rows, middle, _AROUND] > np.maximum(_GROSS_M, 4.0 * usual)
+    return np.asarray(gross & (gross.mean() > _FEW))
+
+
+def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:
+    """Return the track with each pose folded to the nearest image under the exact symmetries of the part.
+
+    Args:
+        track: Camera from part.
+    """
+    symmetric = find_symmetries(solid)
+    is_round = find_revolution(solid) is not None
+    n = len(track.t)
+    if len(symmetric) == 1 and not is_round:
+        return FoldedTrack(track, np.zeros(n, dtype=np.bool_))
+    R = np.array(track.T[:, :3, :3])
+    S = symmetric[:, :3, :3]
+    T = np.array(track.T)
+    chosen = np.zeros(n, dtype=np.int64)
+    for i in range(1, n):
+        before = R[max(0, i - _BEFORE) : i]
+        near = before[np.einsum("aij,bij->ab", before, before).sum(axis=1).argmax()]
+        if is_round:
+            T[i] = find_nearest_equivalent_pose(solid, track.T[i], near)
+            R[i] = T[i, :3, :3]
+        else:
+            images = track.T[i, :3, :3] @ S
+            traces = np.einsum("mij,ij->m", images, near)
+            chosen[i] = int(np.argmax(traces >= traces.max() - 1e-12))
+            R[i] = images[chosen[i]]
+    if is_round:
+        about = np.einsum("nij,nij->n", T[:, :3, :3], track.T[:, :3, :3])
+        return FoldedTrack(PoseTrack(track.t, T), (about - 1.0) / 2.0 < _TURNED)
+    most = int(np.bincount(chosen).argmax())  # the image of most frames stays as it was reported
+    images = symmetric[chosen] @ pose.inverse(symmetric[most])
+    return FoldedTrack(PoseTrack(track.t, track.T @ images), chosen != most)
+
+
+def list_images(solid: Solid, T: Array, turns: int = 1) -> Array:
+    """Return the poses at which a part looks as it does at T, (m, 4, 4), T first.
+
+    Args:
+        turns: Number of turns about an axis of revolution, from 0 on.
+    """
+    images = T @ find_symmetries(solid)
+    about = find_revolution(solid)
+    if about is None:
+        return np.asarray(images)
+    angles = 2.0 * np.pi * np.arange(turns) / turns
+    return np.concatenate([images @ make_rotation_about_axis(about.point, about.axis, angle) for angle in angles])
+
+
+def free_twist(solid: Solid) -> Array | None:
+    """Return the body twist of a turn about the axis of revolution of a part, (6,); None if it has no such axis."""
+    about = find_revolution(solid)
+    return None if about is None else np.concatenate([np.cross(about.point, about.axis), about.axis])
+
+
+def fold_to(solid: Solid, T: Array, expected: Array) -> Array:
+    """Return the image of a pose T that is turned least from an expected pose, (4, 4)."""
+    return np.asarray(find_nearest_equivalent_pose(solid, T, expected))
+
+
+def forget_turn(solid: Solid, C: Array) -> Array:
+    """Return a covariance of a body twist, (6, 6), with the variance about an axis of revolution, which folding hides.
+
+    It becomes the mean of the variances about the axes across, since no measurement tells it.
+    """
+    about = find_revolution(solid)
+    if about is None:
+        return C
+    a = about.axis
+    across = np.eye(3) - np.outer(a, a)
+    R = across @ C[3:, 3:] @ across
+    out = np.array(C)
+    out[3:, 3:] = R + np.outer(a, a) * np.trace(R) / 2.0
+    out[:3, 3:] = C[:3, 3:] @ across
+    out[3:, :3] = out[:3, 3:].T
+    return out
+
+
+def are_alike(a: Solid, b: Solid) -> bool:
+    """Return whether two parts have the same shape in their own frames, so that a tracker confuses them."""
+    if len(a.pieces) != len(b.pieces):
+        return False
+    corners = [np.sort(np.concatenate([piece.corners for piece in solid.pieces]).round(6), axis=0) for solid in (a, b)]
+    return corners[0].shape == corners[1].shape and bool(np.abs(corners[0] - corners[1]).max() < 1e-5)
+
+
+def turn_between(solid: Solid | None, T: Array, other: Array) -> Array:
+    """Return the least angle between images of two poses, [rad]; poses broadcast.
+
+    Args:
+        solid: Shape of the part; None: no symmetry is known.
+    """
+    D = pose.inverse(T) @ other
+    if solid is None:
+        return np.asarray(np.linalg.norm(pose.log(D)[..., 3:], axis=-1))
+    images = D[..., None, :, :] @ find_symmetries(solid)
+    about = find_revolution(solid)
+    if about is not None:  # only the tilt of the axis counts
+        tilt = np.abs if about.reversible else (lambda x: x)
+        return np.asarray(
+            np.arccos(np.clip(tilt(np.einsum("i,...ij,j->...", about.axis, D[..., :3, :3], about.axis)), -1, 1))
+        )
+    traces = np.trace(images[..., :3, :3], axis1=-2, axis2=-1)
+    return np.asarray(np.arccos(np.clip((traces.max(axis=-1) - 1.0) / 2.0, -1.0, 1.0)))
