@@ -97,13 +97,14 @@ def zero(robot: Robot, wrist: WristSensor) -> None:
 
 
 def zero_again(robot: Robot, wrist: WristSensor) -> None:
-    """Tare the wrist sensor before a guarded motion if it has drifted; the arm stands still in free air.
+    """Tare the wrist sensor before a guarded motion if it has ever drifted; the arm stands still in free air.
 
     Raises:
         ExecutionAborted: Something went wrong meanwhile.
     """
     with read_wrist(robot, wrist):
-        if wrist.is_off:
+        wrist.drifts = wrist.drifts or wrist.is_off
+        if wrist.drifts:
             zero(robot, wrist)
 
 

@@ -124,6 +124,8 @@ class WristSensor:
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
         self._drift = drift
         self._zero: Array = np.zeros(6)
+        self.drifts = False
+        """Whether the sensor was found to drift, so that it is zeroed before each guarded motion."""
         data, T_tip = open_hand(scene.kinematics, scene.arm.opening_m)
         mount = body_frame(data, scene.kinematics.model.body(scene.arm.mount).id)
         self._T_tip_sensor = pose.inverse(T_tip) @ mount  # both are on the same rigid body
