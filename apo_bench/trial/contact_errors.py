@@ -218,7 +218,7 @@ class ContactEvidence:
 
     @cached_property
     def _W(self) -> Array:
-        return np.linalg.inv(self._S)
+        return np.asarray(np.linalg.inv(self._S), dtype=np.float64)
 
     def log_density(self) -> float:
         """Log of the density of the residuals if no contact is wrong, up to a constant."""

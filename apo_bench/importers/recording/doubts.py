@@ -1,6 +1,6 @@
 """List what remains doubtful in a recording that fits its scenario, one sentence each."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -9,19 +9,27 @@ from apo_bench.geometry import Array
 from apo_bench.importers.recording.arrangement import Arrangement
 from apo_bench.importers.recording.averaging import per_axis
 from apo_bench.importers.recording.rest_intervals import RestIntervals
+from apo_bench.importers.recording.tracks import PoseTrack, span_of
 
 _MANY = 0.25  # share of outliers among the frames of a rest that is doubtful
+_HIDDEN_S = 0.5  # a part without frames for so long, and for so many usual steps, was hidden
+_HIDDEN_FRAMES = 5
 _OPEN_MM = 3.0  # smallest gap of a doubtful contact
 _OPEN_DEVIATIONS = 5.0  # standard deviations of the pose, added to the gap above
 """A contact is doubtful if it is open by more than the sum of both; a degree counts like a millimetre."""
 
 
 def list_doubts(
-    intervals: RestIntervals, arrangement: Arrangement, covariance: Array, assembly: Assembly
+    tracks: Mapping[str, PoseTrack],
+    intervals: RestIntervals,
+    arrangement: Arrangement,
+    covariance: Array,
+    assembly: Assembly,
 ) -> tuple[str, ...]:
     """Return one sentence for each doubt.
 
     Args:
+        tracks: Track of each part, camera from part.
         covariance: Covariance of each observed pose, (n, 6, 6), [m, rad].
     """
     return (
@@ -30,7 +38,7 @@ def list_doubts(
         *_outliers(intervals, arrangement),
         *_open_contacts(arrangement, covariance, assembly),
         *_pauses(intervals, arrangement, assembly),
-        *_hidden(intervals),
+        *_hidden(tracks),
     )
 
 
@@ -87,8 +95,8 @@ def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assemb
             yield f"'{part}' also rested at {times}, counted as pauses; state --operation-ends if it was put down"
 
 
-def _hidden(intervals: RestIntervals) -> Iterator[str]:
-    """Yield a sentence for each rest after which the tracker lost the part."""
-    for part, known in intervals.items():
-        for rest in (rest for interval in known for rest in interval.rests if rest.gone > rest.ends):
-            yield f"'{part}' was hidden from {rest.ends:.2f} to {rest.gone:.2f} s"
+def _hidden(tracks: Mapping[str, PoseTrack]) -> Iterator[str]:
+    """Yield a sentence for each time in which the tracker lost a part."""
+    for part, track in tracks.items():
+        for i in np.flatnonzero(np.diff(track.t) > max(_HIDDEN_S, _HIDDEN_FRAMES * span_of(track))):
+            yield f"'{part}' was hidden from {track.t[i]:.2f} to {track.t[i + 1]:.2f} s"

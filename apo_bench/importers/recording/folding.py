@@ -137,6 +137,18 @@ def forget_turn(solid: Solid, C: Array) -> Array:
     return out
 
 
+def turn_as_reported(solid: Solid, T: Array, reported: Array) -> Array:
+    """Return a pose with the mean turn about its axis of revolution of reported poses, (n, 4, 4); T for other parts."""
+    about = find_revolution(solid)
+    if about is None:
+        return T
+    M = T[:3, :3].T @ reported[:, :3, :3]
+    # Of a turn about a, the sum of M * hat(a) is 2 sin, and trace(M) - a . M a is 2 cos.
+    sine = (M * pose.hat(about.axis)).sum()
+    cosine = (np.trace(M, axis1=1, axis2=2) - np.einsum("i,nij,j->n", about.axis, M, about.axis)).sum()
+    return np.asarray(T @ make_rotation_about_axis(about.point, about.axis, float(np.arctan2(sine, cosine))))
+
+
 def are_alike(a: Solid, b: Solid) -> bool:
     """Return whether two parts have the same shape in their own frames, so that a tracker confuses them."""
     if len(a.pieces) != len(b.pieces):

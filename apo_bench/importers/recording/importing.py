@@ -14,7 +14,7 @@ from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
-from apo_bench.importers.recording.folding import find_gross, fold_track
+from apo_bench.importers.recording.folding import find_gross, fold_track, turn_as_reported
 from apo_bench.importers.recording.matching import TagOffset, list_choices
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
@@ -105,6 +105,7 @@ def import_recording(
     except NoMatchingOrder as error:
         raise InputError(f"{file}: {error}") from error
     other = check_arrangement(arrangement, arrange_tracks, tracks, models or {}, file)
+    raw = tracks
     tracks = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
@@ -117,7 +118,9 @@ def import_recording(
     covariance = np.tile(np.diag(UNOBSERVED_DEVIATION**2), (len(operations), 1, 1))
     for k, (_, rest, *_) in enumerate(operations):
         if rest is not None:
-            poses[k] = X @ rest.T
+            part = assembly.operations[k].main
+            reported = raw[owned[part]].T[rest.first : rest.last + 1]
+            poses[k] = X @ turn_as_reported(assembly.solids[part], rest.T, reported)
             covariance[k] = rest.mean.covariance + rest_error(camera, rest.mean)
             for offset in (offsets or {}).get(assembly.operations[k].main, ()):
                 frames = int(np.sum((offset.t >= rest.begins) & (offset.t <= rest.ends)))
@@ -142,7 +145,7 @@ def import_recording(
         for part, n in wrong.items()
         if n > _MANY * (n + len(tracks[part].t))
     )
-    doubts = (*other, *many, *list_doubts(intervals, arrangement, covariance, assembly))
+    doubts = (*other, *many, *list_doubts(tracks, intervals, arrangement, covariance, assembly))
     return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, wrong, doubts)
 
 

@@ -117,6 +117,24 @@ def test_a_part_that_is_hidden_while_others_are_placed_is_where_it_is_seen_again
     assert all(np.linalg.norm(twist[:3]) < 1e-3 for each in later.operations for twist in each.adjusted.values())
 
 
+def test_a_round_part_that_spins_rests_and_may_be_hidden_while_another_is_placed() -> None:
+    name = "peg_in_hole"
+    tracks = seen(name, 0.5)
+    base = place_layout(load_scenario(name), 0.1, 0.0, 0.3, clearance_mm=load_scenario(name).clearance_mm).start["base"]
+    camera = replace(GIVEN, known={"base": base})
+    whole = imported(tracks, camera, name)
+    t, T = tracks["peg"]
+    spin = np.array([pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 30.0 * x)) for x in t])
+    spun = without(PoseTrack(t, T @ spin), 0.6, 2.5)
+    found = imported({**tracks, "peg": spun}, camera, name)
+    off = pose.log(pose.inverse(whole.observation.poses) @ found.observation.poses)
+    assert np.abs(off[:, :3]).max() < 5e-4
+    assert np.abs(off[:, 3:5]).max() < 5e-3  # not about the axis, z
+    size = [np.diagonal(each.covariance, axis1=1, axis2=2) for each in (found, whole)]
+    assert np.allclose(*size, rtol=1.0)  # variances of means of 24 frames
+    assert any(doubt.startswith("'peg' was hidden") for doubt in found.doubts)
+
+
 def test_a_part_that_moves_during_the_operation_of_another_is_refused() -> None:
     tracks = seen(NAME, 0.3)
     pushed = pose.at((0.03, 0.0, 0.0))

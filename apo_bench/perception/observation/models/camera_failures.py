@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Observation, compute_placements, make_measured_model
 from apo_bench.errors import require
 from apo_bench.geometry import Array, find_approximate_symmetries, pose
-from apo_bench.perception.observation.models.camera import CAMERA_DISTANCE_M, Camera
+from apo_bench.perception.observation.models.camera import CAMERA_DISTANCE_M, CAMERA_ELEVATION_DEG, Camera
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
@@ -239,13 +239,17 @@ def _misjudge_size(poses: Array, shown: Demonstration, camera: Camera, rate: flo
 
 def _mirror(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Turn parts about the vertical, so that their angle to the view of the camera has the wrong sign."""
+    elevation = np.radians(CAMERA_ELEVATION_DEG)
+    up = camera.T_world_camera[:3, :3] @ np.array([0.0, -np.cos(elevation), -np.sin(elevation)])
     view = camera.T_world_camera[:3, 2]
     for k in draw_failed_operations(len(poses), rate, rng):
         x = poses[k, :3, 0]
-        yaw = np.arctan2(x[1], x[0]) - np.arctan2(view[1], view[0])
+        # the angle from the view to the x axis of the part, about the vertical
+        yaw = np.arctan2(up @ np.cross(view, x), view @ x - (view @ up) * (x @ up))
         # an angle from -45 to 45 degrees to the nearest axis of the view
         nearest = yaw - 0.5 * np.pi * np.round(yaw / (0.5 * np.pi))
-        poses[k, :3, :3] = pose.exp(np.array([0, 0, 0, 0, 0, -2.0 * nearest]))[:3, :3] @ poses[k, :3, :3]
+        turn = pose.exp(np.concatenate([np.zeros(3), -2.0 * nearest * up]))
+        poses[k, :3, :3] = turn[:3, :3] @ poses[k, :3, :3]
 
 
 PRESETS: Mapping[str, Failure] = MappingProxyType(
