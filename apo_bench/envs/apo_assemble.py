@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from apo_bench.assembly import Outcome, Snapshot
-from apo_bench.envs.apo_insert import APOInsert, ObservedBatch, ended
+from apo_bench.envs.apo_insert import APOInsert, Seen, ended
 from apo_bench.errors import require
 from apo_bench.simulation.task.tip_control import TipControl
 
@@ -64,7 +64,7 @@ class APOAssemble(APOInsert):
         self._begin(follows)
         return {}
 
-    def _seen(self) -> ObservedBatch:
+    def _seen(self) -> Seen:
         # one-hot vector of the current operation
         place = np.arange(len(self._now().plan.assembly)) == self.operation - 1
         return {**super()._seen(), "operation": place.astype(np.float32)}

@@ -26,7 +26,7 @@ from apo_bench.envs.episode import (
 )
 from apo_bench.envs.rendering import FPS, MODES, Rendering
 from apo_bench.envs.robot import RobotSettings, execute_plan
-from apo_bench.envs.spaces import Action, ObservedBatch, action_space, moved, observation_entries, observation_space
+from apo_bench.envs.spaces import Action, Seen, action_space, moved, observation_entries, observation_space
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -60,7 +60,7 @@ from apo_bench.trial.trial_stages import (
 
 @final
 @check_arguments
-class APOReplay(gymnasium.Env[ObservedBatch, Action]):
+class APOReplay(gymnasium.Env[Seen, Action]):
     """Replay an observed assembly.
 
     ## Description
@@ -229,9 +229,7 @@ class APOReplay(gymnasium.Env[ObservedBatch, Action]):
             raise gymnasium.error.ResetNeeded(f"{missing} yet; call reset() first.")
         return self._episode
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[ObservedBatch, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Observe another demonstration; `seed=k` is trial k.
 
         Args:
@@ -260,7 +258,7 @@ class APOReplay(gymnasium.Env[ObservedBatch, Action]):
         return observation_entries(observation), {"demonstration": simulated.demonstration.code}
 
     @check_arguments
-    def step(self, action: Action) -> tuple[ObservedBatch, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the target poses, each moved by its twist.
 
         Raises:

@@ -10,7 +10,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import VERDICTS, step_info, verdicts
-from apo_bench.envs.spaces import ObservedBatch, packed, track_spaces
+from apo_bench.envs.spaces import Seen, packed, track_spaces
 from apo_bench.envs.tracking import Policy, Tracked, TrackingAction, observe_first, reach_exactly
 from apo_bench.errors import InputError, shown
 from apo_bench.geometry import Array, pose
@@ -23,7 +23,7 @@ DO, UNDO, FINISH = range(3)  # values of `act`
 
 @final
 @check_arguments
-class APOTrack(gymnasium.Env[ObservedBatch, dict[str, Any]]):
+class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
     """Follow a human, operation by operation.
 
     ## Description
@@ -79,9 +79,7 @@ class APOTrack(gymnasium.Env[ObservedBatch, dict[str, Any]]):
         self._over = True
 
     @check_arguments
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[ObservedBatch, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Observe another demonstration; `seed=k` is trial k."""
         super().reset(seed=seed)
         _, info = self._base.reset(seed=seed, options=options)
@@ -92,7 +90,7 @@ class APOTrack(gymnasium.Env[ObservedBatch, dict[str, Any]]):
         self._over = False
         return self._entries(), {**info, "action_mask": self._mask()}
 
-    def step(self, action: dict[str, Any]) -> tuple[ObservedBatch, float, bool, bool, dict[str, Any]]:
+    def step(self, action: dict[str, Any]) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Do an operation, undo one, or finish.
 
         Raises:
@@ -179,7 +177,7 @@ class APOTrack(gymnasium.Env[ObservedBatch, dict[str, Any]]):
         possible = self._done < self._shown, self._done > 0, True
         return np.array([each and not self._over for each in possible], dtype=np.int8)
 
-    def _entries(self) -> ObservedBatch:
+    def _entries(self) -> Seen:
         """Return the observation; operations that were not shown have identities and zeros."""
         n = len(self._placed)
         seen: Observation = self._base.observation

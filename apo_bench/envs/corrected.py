@@ -7,7 +7,7 @@ import gymnasium
 
 from apo_bench.arguments import check_arguments
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.spaces import Action, ObservedBatch, packed
+from apo_bench.envs.spaces import Action, Seen, packed
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
@@ -15,9 +15,7 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 @final
 @check_arguments
-class CorrectPoses(
-    gymnasium.Wrapper[ObservedBatch, Action, ObservedBatch, Action], gymnasium.utils.RecordConstructorArgs
-):
+class CorrectPoses(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
     """Correct the observed poses of `APOReplay-v0` at every reset.
 
     The observation holds the corrected poses, with the directions that contacts leave free chosen as in trials. An
@@ -34,9 +32,7 @@ class CorrectPoses(
         1.0
     """
 
-    def __init__(
-        self, env: gymnasium.Env[ObservedBatch, Action], corrector: str | Callable[..., Any] = CORRECTOR
-    ) -> None:
+    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: str | Callable[..., Any] = CORRECTOR) -> None:
         """Wrap an `APOReplay` environment.
 
         Args:
@@ -62,9 +58,7 @@ class CorrectPoses(
         self._correct = correct
         self._poses: Array | None = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[ObservedBatch, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Observe another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
         reobserve = self._base.reobserve
@@ -79,11 +73,11 @@ class CorrectPoses(
         self._poses = packed(poses)  # corrected poses, (n, 7)
         return self._with_poses(seen), {**info, "correction": correction.status}
 
-    def step(self, action: Action) -> tuple[ObservedBatch, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the corrected poses, each moved by its twist."""
         seen, reward, terminated, truncated, info = self.env.step(action)
         return self._with_poses(seen), float(reward), terminated, truncated, info
 
-    def _with_poses(self, seen: ObservedBatch) -> ObservedBatch:
+    def _with_poses(self, seen: Seen) -> Seen:
         assert self._poses is not None
         return {**seen, "poses": self._poses.copy()}

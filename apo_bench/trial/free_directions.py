@@ -89,13 +89,13 @@ class FreeSpace:
     def __len__(self) -> int:
         return self.twists.shape[2]
 
-    def list_tangent_directions(self, s: Array) -> Array:
+    def move_along_tangent(self, s: Array) -> Array:
         """Poses moved along free directions, (n, 4, 4); contacts hold to first order."""
         return np.asarray(self.poses @ pose.exp(self.twists @ s))
 
     def place(self, s: Array) -> Array | None:
-        """`tangent(s)` projected back onto the contacts; None if the projection fails."""
-        return self.held.project_to_contacts(self.list_tangent_directions(s))
+        """`move_along_tangent(s)` projected back onto the contacts; None if the projection fails."""
+        return self.held.project_to_contacts(self.move_along_tangent(s))
 
 
 def find_free_space(observation: Observation, goals: Array) -> FreeSpace | None:
@@ -189,7 +189,7 @@ class _FitSearch(NamedTuple):
 
     def _total_excess(self, s: Array) -> float:
         """Sum of all excesses at s."""
-        return float(np.maximum(self.excess(self.space.list_tangent_directions(s)), 0.0).sum())
+        return float(np.maximum(self.excess(self.space.move_along_tangent(s)), 0.0).sum())
 
     def approach_start(self, far: Array) -> Array:
         """A point that fits and is nearer to 0 than `far`, which fits.
@@ -214,9 +214,9 @@ class _FitSearch(NamedTuple):
     def _linearised(self, s: Array) -> tuple[Array, Array]:
         """(G, h) so that each measure in excess at s is repaired to first order where G s' >= h."""
         # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
-        now = self.excess(self.space.list_tangent_directions(s))
+        now = self.excess(self.space.move_along_tangent(s))
         over = now > 0.0  # only measures in excess are linearised
-        ends = [self.excess(self.space.list_tangent_directions(s + _STEP * axis))[over] for axis in np.eye(len(s))]
+        ends = [self.excess(self.space.move_along_tangent(s + _STEP * axis))[over] for axis in np.eye(len(s))]
         G = -(np.array(ends).T - now[over][:, None]) / _STEP
         return G, G @ s + now[over] + _BEYOND
 

@@ -332,7 +332,7 @@ def draw_truths(explanation: PossibleTruth, space: FreeSpace | None, count: int,
     truths = np.repeat(goals[None], count, axis=0)
     if space is not None:
         widths = _widths(space)
-        truths = np.array([space.tangent(widths * s) for s in _spread(rng, count, (len(space),))])
+        truths = np.array([space.move_along_tangent(widths * s) for s in _spread(rng, count, (len(space),))])
     if explanation.turned:
         middle = pose.at(goals[:, :3, 3].mean(axis=0))
         # Yaws are spread evenly over the full turn, in random order, about the mean position.

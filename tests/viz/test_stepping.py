@@ -170,7 +170,7 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("apo_bench.viz.choose_viewer.no_window", lambda: "no window can be opened here (none)")
-    monkeypatch.setattr("apo_bench.viz.choose_viewer.no_browser", lambda: "viser is not installed")
+    monkeypatch.setattr("apo_bench.viz.choose_viewer.explain_missing_browser", lambda: "viser is not installed")
     said = {
         ("view", "stick_in_tower"): "no window can be opened here (none), and for a browser viser is not installed",
         ("view", "stick_in_tower", "--port", "8090"): "--port 8090 needs a browser, but viser is not",
@@ -187,7 +187,7 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
     from apo_bench.viz import browser
 
     server = MagicMock()
-    monkeypatch.setattr(browser, "_server", lambda _: server)
+    monkeypatch.setattr(browser, "_start_server", lambda _: server)
     page = browser.Page(with_target_poses(tower), 8080)
     cursor = page.cursor
     groups = server.gui.add_button_group.call_args_list

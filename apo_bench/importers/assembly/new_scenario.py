@@ -109,7 +109,8 @@ def new_scenario(
     order = search.find(frozenset(base))
     if order is None:
         raise NoAssemblyOrder(
-            "; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + "."
+            "; ".join(["there is no order in which these parts can be put together", *search.describe_stuck_parts()])
+            + "."
         )
     mains = [placing.moves[0] for placing in order]
     require(

@@ -140,9 +140,7 @@ def make_upright_wall(thick: float, depth: float, low: float, high: float, hole:
         hole: Its x is the height of the hole, its y the position along y.
     """
     # Made lying, then turned up about y: -x becomes z, and z becomes x.
-    bored = bore(
-        (-make_pin_hole.x, make_pin_hole.y), make_pin_hole.radius, -thick / 2, thick / 2, make_pin_hole.name, fit=True
-    )
+    bored = bore((-hole.x, hole.y), hole.radius, -thick / 2, thick / 2, hole.name, fit=True)
     lying = extrude(make_rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
     return lying.moved(turn_deg=(0, 90, 0))
 

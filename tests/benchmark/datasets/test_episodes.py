@@ -132,7 +132,7 @@ def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monk
             os.kill(os.getpid(), signal.SIGTERM)
             yield each
 
-    monkeypatch.setattr(trial_dataset, "replays", signalled)
+    monkeypatch.setattr(trial_dataset, "record_replays", signalled)
     words = ["dataset", "make", "block_on_block", "--episodes", "3", "--format", form, "--out", str(tmp_path / "out")]
     assert main(words) == 128 + signal.SIGTERM
     assert "1 simulated trial," in (tmp_path / "out" / "README.md").read_text()

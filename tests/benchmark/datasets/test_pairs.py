@@ -67,7 +67,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
         return np.array([*np.log(quartiles).ravel(), *np.log(stated).ravel(), 3.0 * many.seen.mean(), alike])
 
     together = drawn()
-    monkeypatch.setattr("apo_bench.benchmark.datasets.training_pairs.by_part", lambda noise: False)
+    monkeypatch.setattr("apo_bench.benchmark.datasets.training_pairs.observes_by_part", lambda noise: False)
     np.testing.assert_allclose(together, drawn(), atol=0.3)
 
 

@@ -75,7 +75,7 @@ def _cut_at_reflex_edges(
             # middle, since planes of reflex edges may miss it.
             planes = _list_cut_planes(body, size, flats, only_flats) if cuts[0] > 0 else []
             for n, d in [*planes[:_TRIES], *_list_cavity_planes(body, least)]:
-                halves = each.halves(n, d, HAIR * size)
+                halves = each.cut_in_halves(n, d, HAIR * size)
                 if min(half.body.volume() for half in halves) > least:
                     cuts[0] -= 1
                     to_cut += halves
@@ -168,7 +168,7 @@ def _cut_if_crossed(part: CutPart, n: Array, d: float, hair: float) -> Sequence[
     """
     height = list_body_corners(part.body) @ n - d
     is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
-    return (part,) if is_beside else part.halves(n, d, hair)
+    return (part,) if is_beside else part.cut_in_halves(n, d, hair)
 
 
 def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
