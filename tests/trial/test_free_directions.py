@@ -52,13 +52,13 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     space = space_of(scene)
-    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.nominal_poses, atol=1e-15)
+    np.testing.assert_allclose(space.move_along_tangent(np.zeros(len(space))), scene.nominal_poses, atol=1e-15)
     for _ in range(3):
         s = 3.0 * rng.normal(size=len(space))
         goals = space.place(s)
         assert goals is not None
         assert build_contact_equations(scene.assembly, scene.start, goals).gaps(goals).max() < 1e-9
-        np.testing.assert_allclose(goals[:, :3, 3], space.tangent(s)[:, :3, 3], atol=3e-3)
+        np.testing.assert_allclose(goals[:, :3, 3], space.move_along_tangent(s)[:, :3, 3], atol=3e-3)
 
 
 def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_is_gone() -> None:
