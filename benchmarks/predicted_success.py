@@ -1,7 +1,7 @@
 """Measure the predicted success of plans: `python -m benchmarks.predicted_success FOLDER`.
 
 Runs trials of generated assemblies and of the benchmark's scenarios, those that FOLDER lacks, and keeps each plan with
-what its planner knew. The generated ones are for whoever changes the prediction; the others, with noise and contacts
+what its planner knew. The generated ones serve to develop the prediction; the others, with noise and contacts
 that the package does not know (`held_out`), measure it: results/predicted_success.csv,
 docs/results/predicted-success.md and its picture. `--again` predicts all kept plans again, without physics; `--page`
 writes the page from the committed trials.

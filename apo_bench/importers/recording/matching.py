@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from apo_bench.errors import InputError, one_line, require
+from apo_bench.errors import one_line, require
 from apo_bench.geometry import Array, Ints, Solid, pose
 from apo_bench.importers.recording.averaging import average, per_axis
 from apo_bench.importers.recording.folding import are_alike, fold_track, list_images, turn_between
@@ -352,10 +352,3 @@ def _merge(track: PoseTrack, other: PoseTrack) -> PoseTrack:
         elif np.linalg.norm(off[:3]) < _GATE_M and np.linalg.norm(off[3:]) < 0.5:
             poses[-1] = poses[-1] @ pose.exp(0.5 * off)
     return PoseTrack(np.array(times), np.array(poses))
-
-
-def check_matched(matched: MatchedTracks, needed: Sequence[str], file: str) -> None:
-    """Raise InputError if a part that an operation moves has no track."""
-    for part in needed:
-        if part not in matched.tracks:
-            raise InputError(f"{file}: '{part}' is not tracked; name its id in the objects file.")
