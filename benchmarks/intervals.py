@@ -40,7 +40,7 @@ def spread(rate: float, conditions: int, unequal: bool) -> Array:
 
 def cover_rate(rates: Array, trials: int, rng: np.random.Generator) -> float:
     """Return how often the interval of the mean of some rates contains it."""
-    truth = rates.compute_mean()
+    truth = rates.mean()
     covered = 0
     for _ in range(DRAWS):
         low, high = measure_mean_rate(list((rng.random((len(rates), trials)) < rates[:, None]).astype(float))).interval

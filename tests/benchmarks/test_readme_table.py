@@ -30,7 +30,7 @@ def test_rates_are_pooled_over_scenarios_at_one_level_without_human_error() -> N
 
 def test_methods_of_one_condition_ran_the_same_number_of_trials() -> None:
     trials: dict[str, set[str]] = {}
-    for condition, _, success in rows():
+    for condition, _, success, _ in rows():
         trials.setdefault(condition, set()).add(success.split(" of ")[1].split()[0])
     assert sorted(map(sorted, trials.values())) == [["40"], ["80"], ["80"]]
     assert {line["fidelity"] for line in conditions(HEADLINE)} == {"near-contact"}

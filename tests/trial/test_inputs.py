@@ -42,7 +42,7 @@ def add_and_note(spec, body, picture):
 part_file.add_picture = add_and_note
 from apo_bench import TrialConfig
 from apo_bench.trial import input_files
-from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.fingerprint import compute_config_hash, compute_content_hash
 from apo_bench.trial.trial_stages import scene_of
 from apo_bench.trial.run import run_trial
 
@@ -75,7 +75,7 @@ files = sorted(
 
 def identity():
     input_files._module_digest.cache_clear()
-    return config_hash(settings, content_hash(scene.scenario, settings.scenario, scene.arm.files))
+    return compute_config_hash(settings, compute_content_hash(scene.scenario, settings.scenario, scene.arm.files))
 
 before = identity()
 assert identity() == before

@@ -61,13 +61,13 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
 def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> None:
     cursor = Cursor(with_target_poses(tower))
     cursor.go(2)
-    assert "as seen: 10.00 mm, 0.00 degrees off" in cursor.words()
+    assert "as observed: 10.00 mm, 0.00 degrees off" in cursor.words()
     assert "as it is now: 0.00 mm, 0.00 degrees off" in cursor.words()
     assert cursor.snapshot().overlays == ()
     cursor.press("goals")
     seen, true = cursor.snapshot().overlays
     assert sorted(seen.poses) == sorted(true.poses) == ["castle1", "castle2"]
-    assert cursor.words()[-2:] == ("orange: as seen", "violet: true")
+    assert cursor.words()[-2:] == ("orange: as observed", "violet: true")
     shifts = [seen.poses[part][:3, 3] - true.poses[part][:3, 3] for part in seen.poses]
     np.testing.assert_allclose(shifts, [(0.01, 0.0, 0.0)] * 2, atol=1e-12)
     shapes = list(shapes_of(tower, make_initial_state(tower.work, cursor.segment.start), cursor.snapshot()))

@@ -25,7 +25,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Robot that probes": ("--ft-sensor", "--assumed-robot-error"),
         "Observation": ("--noise-level", "--noise-mm", "--noise-deg", "--noise", "--pose-source", "--observation"),
         "Correction": ("--method", "--contact-source", "--max-reobservations", "--min-predicted-success"),
-        "Trials": ("--trials", "--seed", "--secret-seed-file"),
+        "Trials": ("--trials", "--seed", "--independent-seeds", "--secret-seed-file"),
         "Simulation": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Processes": ("--workers", "--backend", "--address"),
         "Files": ("--out", "--save-observation", "--video"),

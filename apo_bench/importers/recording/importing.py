@@ -15,7 +15,7 @@ from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
 from apo_bench.importers.recording.folding import find_gross, fold_track, turn_as_reported
-from apo_bench.importers.recording.matching import TagOffset, list_choices
+from apo_bench.importers.recording.matching import TagOffset, list_matchings
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
 from apo_bench.importers.recording.rest_intervals import RestIntervals, find_all_intervals
@@ -157,7 +157,7 @@ def _arrange_identical(
     """Return the best arrangement of all ways in which identical parts may have their tracks, and part -> track."""
     tried: list[tuple[Arrangement, Mapping[str, str]]] = []
     failed: NoMatchingOrder | None = None
-    for way in list_choices(identical):
+    for way in list_matchings(identical):
         own = {part: way.get(part, part) for part in intervals}
         try:
             changed = {

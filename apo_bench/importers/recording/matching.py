@@ -129,7 +129,7 @@ def _listed(names: Mapping[str, object]) -> str:
     return ", ".join(f"'{one_line(name, 60)}'" for name in [*names][:_MOST_IDS])
 
 
-def list_choices(identical: Sequence[Sequence[str]]) -> Sequence[Mapping[str, str]]:
+def list_matchings(identical: Sequence[Sequence[str]]) -> Sequence[Mapping[str, str]]:
     """Return the ways in which tracks of identical parts may belong to them: part -> part whose track is its own."""
     each = [[dict(zip(parts, order, strict=True)) for order in permutations(parts)] for parts in identical]
     ways = [{k: v for one in way for k, v in one.items()} for way in product(*each)]

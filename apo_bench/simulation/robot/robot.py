@@ -220,7 +220,7 @@ class Robot:
         Args:
             parts: Number of shorter steps into which each physics step is divided.
         """
-        self.data.ctrl[self._drives] = self.q + self._off
+        self.data.ctrl[:] = self._commands(self.q[None])[0]
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._steps_of_tick):
             n = min(self._steps_of_tick, steps - done)

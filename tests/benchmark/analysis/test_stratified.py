@@ -63,7 +63,7 @@ def test_the_interval_of_a_rate_covers_it_as_often_as_it_states(unequal: bool) -
     covered = []
     for rate in RATES:
         rates = spread(rate, 16) if unequal else np.full(16, rate)
-        truth = rates.compute_mean()
+        truth = rates.mean()
         for _ in range(DRAWS):
             low, high = measure_mean_rate(list((rng.random((16, 10)) < rates[:, None]).astype(float))).interval
             covered.append(low <= truth <= high)

@@ -58,8 +58,8 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
     assert elsewhere[0].jpeg != made[0].jpeg
     page = write_report(folder, 1, draw_failures)
     assert page.pictures == 1
-    assert 'src="data:image/jpeg;base64,' in page.render_page.read_text(encoding="utf-8")
-    assert list(pages.trials(page.render_page)["pictures"].values()) == [0]
+    assert 'src="data:image/jpeg;base64,' in page.page.read_text(encoding="utf-8")
+    assert list(pages.trials(page.page)["pictures"].values()) == [0]
 
 
 def test_only_the_method_and_what_is_not_a_default_is_said() -> None:

@@ -129,7 +129,7 @@ def test_free_directions_stay_where_they_were_seen(name: str) -> None:
 def contradiction() -> Observation:
     """A block that must lie on the table with its bottom and, 10 mm off, with its top on a ceiling of the table."""
     low = scenes.solid(
-        "write_csv_table",
+        "table",
         [
             scenes.wall("top", "+z", 0, (-300, -300), (300, 300)),
             scenes.wall("roof", "-z", 60, (-300, -300), (300, 300)),

@@ -60,7 +60,7 @@ def test_what_is_no_part_is_refused_in_one_sentence(
 def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It took two minutes and all the memory."""
     (raw,) = read_raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
-    monkeypatch.setattr(part_import, "cut", None)
+    monkeypatch.setattr(part_import, "cut_solid", None)
     with pytest.raises(InputError, match="no face of the part is flat or round"):
         import_solid(raw, "a", tmp_path, "a.stl")
 

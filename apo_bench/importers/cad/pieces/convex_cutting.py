@@ -11,7 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
-from apo_bench.importers.cad.pieces.hollow_parts import FreeSpace
+from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace
 from apo_bench.importers.cad.pieces.plane_cuts import cut_at_shoulders, cut_into_convex_parts, snap_to_planes
 from apo_bench.importers.cad.pieces.shafts import convert_to_cylinders, refine_shaft_corners
 from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
@@ -62,7 +62,7 @@ def cut_solid(raw: RawSolid, others: Array | None = None) -> CutSolid:
         body = body.simplify(min(1e-3 * size, 0.01))
     hulls = 0
     outlines: list[Array] = []
-    beside = FreeSpace(size, flats, None if others is None else cKDTree(others))
+    beside = HollowSpace(size, flats, None if others is None else cKDTree(others))
     for part in cut_at_shoulders(cut_into_convex_parts(body, beside), shafts, size):
         coarse = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):

@@ -31,7 +31,7 @@ _AT_ONCE = 2_000_000
 """Distances that are computed at once, to limit the memory."""
 
 
-class FreeSpace(NamedTuple):
+class HollowSpace(NamedTuple):
     """The surroundings of a solid, which decide where its pieces must be exact."""
 
     size: float
@@ -76,7 +76,7 @@ class _HullDeviation(NamedTuple):
     """Normals of the sides at the point, (k, 3)."""
 
 
-def refine_pieces(parts: Iterable[CutPart], beside: FreeSpace, volume: float, hair: float) -> Iterator[CutPart]:
+def refine_pieces(parts: Iterable[CutPart], beside: HollowSpace, volume: float, hair: float) -> Iterator[CutPart]:
     """Cut parts further at their worst faults, the worst first, up to the largest number of pieces.
 
     Args:
@@ -104,7 +104,7 @@ def refine_pieces(parts: Iterable[CutPart], beside: FreeSpace, volume: float, ha
             heappush(queue, (-fault.share, next(ticket), each, fault))
 
 
-def _find_worst_deviation(part: CutPart, beside: FreeSpace) -> _HullDeviation:
+def _find_worst_deviation(part: CutPart, beside: HollowSpace) -> _HullDeviation:
     """Return the worst fault of a part, over corners and middles of edges and sides."""
     mesh = convert_to_mesh(part.body)
     planes = _list_hull_planes(mesh.corners)

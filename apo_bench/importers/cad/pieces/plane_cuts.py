@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import list_body_corners
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.pieces.hollow_parts import FreeSpace, refine_pieces
+from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace, refine_pieces
 from apo_bench.importers.cad.solids import Region, convert_to_mesh
 
 _MOST_CUTS = 400  # in one solid
@@ -22,7 +22,7 @@ _ROUGH = 0.01  # volume that hulls may add, as a share of the solid's
 _FINE_TRIANGLES = 4000  # a shape with more triangles is simplified before it is bisected
 
 
-def cut_into_convex_parts(solid: Any, beside: FreeSpace) -> Iterator[CutPart]:
+def cut_into_convex_parts(solid: Any, beside: HollowSpace) -> Iterator[CutPart]:
     """Yield parts that are convex, or whose hulls stand for a hollow free-form shape."""
     volume = solid.volume()
     yield from refine_pieces(
