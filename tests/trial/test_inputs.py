@@ -74,7 +74,7 @@ files = sorted(
 )
 
 def identity():
-    input_files._module_digest.cache_clear()
+    input_files._digest_module.cache_clear()
     return compute_config_hash(settings, compute_content_hash(scene.scenario, settings.scenario, scene.arm.files))
 
 before = identity()
