@@ -29,7 +29,7 @@ _ROTATIONS = (
     "q",
 )
 _MATRICES = (
-    "make_matrix",
+    "matrix",
     "pose",
     "transform",
     "T",
@@ -122,7 +122,7 @@ def _shared_fields(value: Mapping[str, Any]) -> dict[str, Any]:
                 found["secs"] = own
             continue
         if isinstance(own, int | float):
-            name = {"sec": "secs", "t": "t"}.get(column.meaning, column.meaning)
+            name = "secs" if column.meaning == "sec" else column.meaning
             found[f"{name}_{column.unit}" if column.unit else name] = own
     return found
 

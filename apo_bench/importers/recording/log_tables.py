@@ -168,7 +168,7 @@ def _collect(
         raise InputError(
             f"{path}, line {number}: {count} cells stand here, and {len(columns)} are needed; leave out broken rows."
         )
-    return LogTable(path, form, path.stem, columns, rows, places, len(broken))
+    return LogTable(path, form, path.stem, columns, rows, places, broken=len(broken))
 
 
 def _split_objects(table: LogTable) -> list[LogTable]:
@@ -201,8 +201,7 @@ def _read_bop(path: Path, lines: Sequence[_Line]) -> LogTable:
     """Read BOP results: nine numbers of the matrix and three of the position stand in one cell each."""
     columns = _understand(path, _BOP_NAMES, {})
     texts = [line._replace(text=line.text.replace(" ", ",")) for line in lines]
-    table = _collect(path, "BOP results", [*columns, None], texts, ",")
-    return table
+    return _collect(path, "BOP results", [*columns, None], texts, ",")
 
 
 def _read_unnamed(
@@ -229,8 +228,7 @@ def _read_unnamed(
         if len(first) in _UNNAMED:
             form, names_known = _UNNAMED[len(first)]
             return [_collect(path, form, _understand(path, names_known, {}), lines, separator)]
-    _refuse_header(path, lines, separator, columns)
-    raise AssertionError
+    raise _explain_header(path, lines, separator, columns)
 
 
 def _is_number(cell: str) -> bool:
@@ -241,8 +239,8 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _refuse_header(path: Path, lines: Sequence[_Line], separator: str, renamed: Mapping[str, str]) -> None:
-    """Raise InputError that names the columns that were understood, and those that are missing."""
+def _explain_header(path: Path, lines: Sequence[_Line], separator: str, renamed: Mapping[str, str]) -> InputError:
+    """Return an error that names the columns that were understood, and those that are missing."""
     headers = [(line.number, _split(line.text, separator)) for line in lines[:_HEADER_LINES]]
     number, names = max(headers, key=lambda each: sum(column is not None for column in _understand(path, each[1], {})))
     known = _understand(path, names, renamed, check=True)
@@ -250,7 +248,7 @@ def _refuse_header(path: Path, lines: Sequence[_Line], separator: str, renamed: 
     ignored = [name for name, column in zip(names, known, strict=True) if column is None]
     meanings = {column.meaning for column in known if column is not None}
     missing = "a position" if not meanings >= {*POSITION} else "one rotation"
-    raise InputError(
+    return InputError(
         f"{path}, line {number}: {missing} is missing; understood: {_listed(understood)}; not understood: "
         f"{_listed(ignored)}; name columns such as x_mm y_mm z_mm and qw qx qy qz, or state `columns` in the camera "
         "file."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from apo_bench import InputError
 from apo_bench.geometry import pose
 from apo_bench.importers.recording.camera_file import Conventions, read_camera
 from apo_bench.importers.recording.formats import read_log
+from apo_bench.importers.recording.log_tables import read_text_tables
 from apo_bench.importers.recording.matching import match_tracks
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart, read_objects
 from tests.importers.recording.log_forms import FORMS, Tracked
@@ -92,6 +94,23 @@ def test_lost_frames_are_counted_by_kind(tmp_path: Path) -> None:
     # What is there in every frame, such as the base in its own frame, was not lost.
     log.write_text(HEAD + ROW.replace("a", "b").replace("900", "1900") + lost.format(k=2), encoding="utf-8")
     assert len(read_log(log, Conventions()).tracks["a"].t) == 1
+
+
+def test_broken_rows_are_counted_and_are_no_rate(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(
+        HEAD + "".join(f"{0.1 * i},a,{i},0,900,1,0,0,0\n" for i in range(1, 20)) + "1,a\n"
+    )
+    assert read_log(tmp_path / "log.csv", Conventions()).broken == 1
+    (table,) = read_text_tables(tmp_path / "log.csv", {})
+    assert (table.rate_hz, table.broken) == (0.0, 1)
+
+
+@pytest.mark.parametrize("key", ["matrix", "pose", "ob_in_cam", "TCO"])
+def test_matrices_in_json_are_found_by_their_names(key: str, tmp_path: Path) -> None:
+    T = pose.at((0.1, 0.2, 0.9), (10.0, 20.0, 30.0))
+    rows = [{"time": 0.1 * i, "label": "a", key: T.tolist()} for i in range(3)]
+    (tmp_path / "log.json").write_text(json.dumps(rows), encoding="utf-8")
+    np.testing.assert_allclose(read_log(tmp_path / "log.json", Conventions()).tracks["a"].T, [T] * 3, atol=1e-12)
 
 
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
