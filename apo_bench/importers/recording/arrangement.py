@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, Solid, find_symmetries, measure_extent, pose
+from apo_bench.geometry import Array, Solid, find_nearest_equivalent_pose, find_symmetries, measure_extent, pose
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
-from apo_bench.importers.recording.folding import fold_to
 from apo_bench.importers.recording.ordering import (
     NoMatchingOrder,
     Order,
@@ -123,7 +122,7 @@ def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Arr
         expected: Start of the part in the scenario, (4, 4), camera from part.
     """
     first = known[0].rests[0].T
-    g = pose.inverse(first) @ fold_to(solid, first, expected)
+    g = pose.inverse(first) @ find_nearest_equivalent_pose(solid, first, expected)
     return tuple(interval.turn(g) for interval in known)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
-from apo_bench.geometry import Array, Solid, copy_frozen, pose
+from apo_bench.geometry import Array, Solid, copy_frozen, find_nearest_equivalent_pose, pose
 from apo_bench.importers.recording.averaging import Mean
 from apo_bench.importers.recording.camera_file import CameraFile
-from apo_bench.importers.recording.folding import fold_to, free_twist, list_images
+from apo_bench.importers.recording.folding import free_twist, list_images
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
 _ROUNDS = 50  # largest number of Gauss-Newton iterations
@@ -150,9 +150,8 @@ def _refine(X: Array, parts: Sequence[str], K: Array, M: Array, W: Array) -> Cam
 def _fold_all(X: Array, K: Array, M: Array, shapes: Sequence[Solid | None]) -> Array:
     """Return the images of observed poses M nearest to known poses K, (k, 4, 4), for a camera pose X."""
     expected = pose.inverse(X) @ K
-    return np.array(
-        [T if shape is None else fold_to(shape, T, E) for shape, T, E in zip(shapes, M, expected, strict=True)]
-    )
+    known = zip(shapes, M, expected, strict=True)
+    return np.array([T if shape is None else find_nearest_equivalent_pose(shape, T, E) for shape, T, E in known])
 
 
 def _residuals(X: Array, K: Array, M: Array) -> Array:

@@ -50,9 +50,7 @@ def find_gross(track: PoseTrack, solid: Solid) -> NDArray[np.bool_]:
         return np.zeros(n, dtype=np.bool_)
     window = np.clip(np.arange(n)[:, None] + np.arange(-_AROUND, _AROUND + 1), 0, n - 1)
     T = track.T[window]
-    p = T[:, :, :3, 3]
-    apart = np.linalg.norm(p[:, :, None] - p[:, None], axis=-1)
-    apart = apart + _M_PER_RAD * turn_between(solid, T[:, :, None], T[:, None])
+    apart = measure_distances(solid, T[:, :, None], T[:, None])
     middle = np.median(apart, axis=2).argmin(axis=1)
     rows = np.arange(n)
     usual = np.median(apart[rows, middle], axis=1)
@@ -114,11 +112,6 @@ def free_twist(solid: Solid) -> Array | None:
     return None if about is None else np.concatenate([np.cross(about.point, about.axis), about.axis])
 
 
-def fold_to(solid: Solid, T: Array, expected: Array) -> Array:
-    """Return the image of a pose T that is turned least from an expected pose, (4, 4)."""
-    return np.asarray(find_nearest_equivalent_pose(solid, T, expected))
-
-
 def forget_turn(solid: Solid, C: Array) -> Array:
     """Return a covariance of a body twist, (6, 6), with the variance about an axis of revolution, which folding hides.
 
@@ -157,21 +150,27 @@ def are_alike(a: Solid, b: Solid) -> bool:
     return corners[0].shape == corners[1].shape and bool(np.abs(corners[0] - corners[1]).max() < 1e-5)
 
 
-def turn_between(solid: Solid | None, T: Array, other: Array) -> Array:
-    """Return the least angle between images of two poses, [rad]; poses broadcast.
+def measure_distances(solid: Solid | None, T: Array, other: Array) -> Array:
+    """Return distances between poses, [m], to which the turn between their images adds; poses broadcast.
 
     Args:
         solid: Shape of the part; None: no symmetry is known.
     """
+    apart = np.linalg.norm(T[..., :3, 3] - other[..., :3, 3], axis=-1)
+    return np.asarray(apart + _M_PER_RAD * _turn_between(solid, T, other))
+
+
+def _turn_between(solid: Solid | None, T: Array, other: Array) -> Array:
+    """Return the least angle between images of two poses, [rad]; arguments as of `measure_distances`."""
     D = pose.inverse(T) @ other
     if solid is None:
         return np.asarray(np.linalg.norm(pose.log(D)[..., 3:], axis=-1))
-    images = D[..., None, :, :] @ find_symmetries(solid)
     about = find_revolution(solid)
     if about is not None:  # only the tilt of the axis counts
         tilt = np.abs if about.reversible else (lambda x: x)
         return np.asarray(
             np.arccos(np.clip(tilt(np.einsum("i,...ij,j->...", about.axis, D[..., :3, :3], about.axis)), -1, 1))
         )
+    images = D[..., None, :, :] @ find_symmetries(solid)
     traces = np.trace(images[..., :3, :3], axis1=-2, axis2=-1)
     return np.asarray(np.arccos(np.clip((traces.max(axis=-1) - 1.0) / 2.0, -1.0, 1.0)))

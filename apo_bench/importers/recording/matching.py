@@ -10,14 +10,13 @@ from scipy.optimize import linear_sum_assignment
 from apo_bench.errors import one_line, require
 from apo_bench.geometry import Array, Ints, Solid, pose
 from apo_bench.importers.recording.averaging import average, per_axis
-from apo_bench.importers.recording.folding import are_alike, fold_track, list_images, turn_between
+from apo_bench.importers.recording.folding import are_alike, fold_track, list_images, measure_distances
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart
 from apo_bench.importers.recording.tracks import Log, PoseTrack, best_poses, span_of
 
 _GATE_M = 0.05  # a pose farther from the last one of a part is none of it at first
 _FASTEST_M_S = 1.5  # speed of a part, by which it may be farther
 _FORGET_S = 0.3  # longest time for which the speed counts
-_M_PER_RAD = 0.03  # a turn by a radian counts like this distance
 _SWITCH_M = 0.008  # cost of another id than before
 _MOST_CHOICES = 120  # ways in which identical parts are told apart, at most
 _FEWEST_COMMON = 3  # frames that show two tags, from which their offset is solved
@@ -161,14 +160,14 @@ def follow_parts(t: Array, T: Array, labels: Ints | None, k: int, solid: Solid |
         gate = _GATE_M + _FASTEST_M_S * np.minimum(t[at[0]] - seen, _FORGET_S)
         off = np.full((k, len(at)), _GATE_M)
         if known.any():
-            off[known] = _distances(solid, last[known][:, None], T[at][None])
+            off[known] = measure_distances(solid, last[known][:, None], T[at][None])
         cost = np.minimum(off, gate[:, None]) + 1e-3 * off
         if labels is not None:
             cost = cost + _SWITCH_M * (named[:, None] != labels[None, at])
         for row, column in zip(*linear_sum_assignment(cost), strict=True):
             i = int(at[column])
             far = known[row] and off[row, column] > gate[row]
-            if far and not (unsure[row] >= 0 and _distances(solid, T[unsure[row]], T[i]) < gate[row]):
+            if far and not (unsure[row] >= 0 and measure_distances(solid, T[unsure[row]], T[i]) < gate[row]):
                 unsure[row] = i
                 own[i] = -1 if labels is None else row
                 continue
@@ -178,12 +177,6 @@ def follow_parts(t: Array, T: Array, labels: Ints | None, k: int, solid: Solid |
             if labels is not None:
                 named[row] = labels[i]
     return own
-
-
-def _distances(solid: Solid | None, T: Array, other: Array) -> Array:
-    """Return distances between poses, [m], where a turn between their images counts too; poses broadcast."""
-    off = np.linalg.norm(T[..., :3, 3] - other[..., :3, 3], axis=-1)
-    return np.asarray(off + _M_PER_RAD * turn_between(solid, T, other))
 
 
 def _one_for_each(at: Ints, labels: Ints) -> Ints:

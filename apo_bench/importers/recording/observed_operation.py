@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from apo_bench.assembly import Assembly
-from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.folding import fold_to
+from apo_bench.geometry import Array, find_nearest_equivalent_pose, pose
 from apo_bench.importers.recording.ordering import end_of_operation, time_taken
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 from apo_bench.importers.recording.rests import Rest
@@ -53,7 +52,11 @@ def observed_operation(
     among = (track.t >= begins) & (track.t <= rest.begins)
     seen = track.T[among]
     if len(seen):  # the image of the rest
-        seen = seen @ pose.inverse(seen[-1]) @ fold_to(assembly.solids[operation.main], seen[-1], rest.T)
+        seen = (
+            seen
+            @ pose.inverse(seen[-1])
+            @ find_nearest_equivalent_pose(assembly.solids[operation.main], seen[-1], rest.T)
+        )
     path = PoseTrack(track.t[among], T_world_camera @ seen)
     # Poses before this operation include what earlier operations put, even if their part came to rest after this start.
     before = find_rest_poses(
