@@ -20,8 +20,9 @@ from apo_bench.correction.checks.status import refuse_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
+from apo_bench.correction.robust.chosen_hypothesis import retest_as_chosen
 from apo_bench.correction.robust.crowding import least_crowded
-from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated, retest_as_chosen
+from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, region_scale, scale_noise, scale_words
 from apo_bench.correction.robust.search import Search
