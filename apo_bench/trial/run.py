@@ -209,8 +209,14 @@ def _plan_and_replay(
         record = end_record(planned.failure, success=False)
     else:
         predicted_success = predict_success(
-            *(planned.plan, given, planned.correction, context.scene),
-            *(config.robot_error, spiral, probe, config.contact_source),
+            planned.plan,
+            given,
+            planned.correction,
+            context.scene,
+            robot_error=config.robot_error,
+            spiral=spiral,
+            probing=probe,
+            contact_source=config.contact_source,
         )
         prediction = predicted_outcome(planned.plan, context.scene, spiral)
         if predicted_success < config.min_predicted_success:
