@@ -13,7 +13,7 @@ from apo_bench.benchmark.analysis import read_timing
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.report.comparison.text import make_comparison_form
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.trials import read_trials
+from apo_bench.records.run.trial_reader import read_trials
 
 FILES = ("trials.jsonl", "run.json", "timing.jsonl")
 

@@ -40,7 +40,8 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, has_parquet, write_file, write_parts
 from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_file import list_scenario_files, read_run
-from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
+from apo_bench.records.run.trial_reader import read_trials
+from apo_bench.records.run.trials import COLUMNS, Trials
 
 MOST_PANELS = 16
 """Most panels of a figure that is also drawn as PNG; more would take minutes."""

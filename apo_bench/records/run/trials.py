@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import gc
 import math
-import multiprocessing
-import os
-import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
-from operator import attrgetter
-from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array
-from apo_bench.io import CONTROL, clean, open_file
+from apo_bench.io import clean
 from apo_bench.records.record import RECORD_FIELDS
-from apo_bench.records.run.run_folder import TRIALS_KIND, find_trials, iterate_records
-from apo_bench.records.run.validation import CHECKED, NAMES, decode_kept, find_contradiction
 from apo_bench.records.secret_seed import find_common_secret_seed
-from apo_bench.records.settings import RECORD_SCHEMA, SETTINGS
+from apo_bench.records.settings import SETTINGS
 
 Mask = NDArray[np.bool_]
 """(n,): which trials."""
@@ -57,14 +48,12 @@ COLUMNS: Mapping[str, type | None] = {
 """Column that is kept -> type of its numbers; None for a column of other values."""
 _PREDICTED = {"predicted_fails": "fails", "predicted_operation": "operation", "predicted_code": "code"}
 """Column -> key of the failure prediction."""
-_STATED = tuple(name for name in COLUMNS if name not in _PREDICTED)
-_GET = attrgetter(*_STATED)
+STATED = tuple(name for name in COLUMNS if name not in _PREDICTED)
+"""Columns that a record states itself."""
 _LISTS = tuple(name for name, kind in RECORD_FIELDS.items() if "list" in str(kind))
 """Columns of lists, which are kept as tuples."""
 _CHUNK = 4_000
 """Records that are made columns at once."""
-_LEAST_SHARE = 32 * 2**20
-"""Fewest bytes for which a process is worthwhile."""
 
 
 class CodedColumn(NamedTuple):
@@ -228,84 +217,20 @@ def make_trials(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
     if isinstance(records, Trials):
         return records
     parts = []
-    for chunk in _batched(records):
-        values = {name: [record.get(name, _USUAL.get(name)) for record in chunk] for name in _STATED}
-        parts.append(_columns_of(values, [record.get("failure_prediction") or {} for record in chunk]))
-    return _join(parts)
+    for chunk in iterate_batches(records):
+        values = {name: [record.get(name, _USUAL.get(name)) for record in chunk] for name in STATED}
+        parts.append(make_columns(values, [record.get("failure_prediction") or {} for record in chunk]))
+    return join_trials(parts)
 
 
-def read_trials(folder: str | Path) -> Trials:
-    """Read the trials of a sweep; large files are read by several processes where processes can be forked.
-
-    Raises:
-        InputError: There is no such folder, it holds no trials, or a line is no complete record.
-    """
-    path = find_trials(folder)
-    size = path.stat().st_size
-    many = min(os.cpu_count() or 1, size // _LEAST_SHARE) if sys.platform == "linux" else 1
-    ends = [size * i // max(1, many) for i in range(max(1, many) + 1)]
-    if many <= 1:
-        parts = [_read_share(path, 0, size)]
-    else:
-        with ProcessPoolExecutor(many, multiprocessing.get_context("fork"), gc.disable) as pool:
-            parts = list(pool.map(_read_share, [path] * many, ends, ends[1:]))
-    right = [part for part in parts if part is not None]
-    # the message names the line
-    return _join(right) if len(right) == len(parts) else make_trials(iterate_records(folder))
-
-
-def _read_share(path: Path, start: int, end: int) -> Trials | None:
-    """Read the records of the lines that begin from `start` to before `end` bytes; None if one is wrong."""
-    parts = []
-    with open_file(path, TRIALS_KIND) as file:
-        for lines in _batched(_lines_between(file, start, end)):
-            records: list[Any]
-            try:
-                records = list(map(decode_kept, lines))
-            except (msgspec.DecodeError, RecursionError, ValueError):
-                return None
-            values = dict(zip(_STATED, zip(*map(_GET, records), strict=True), strict=True))
-            part = _columns_of(values, [record.failure_prediction or {} for record in records])
-            if not _is_consistent(part):
-                return None
-            parts.append(part)
-    return _join(parts)
-
-
-def _is_consistent(trials: Trials) -> bool:
-    """Return whether all records pass the checks of `decode_record`, given that they could be decoded."""
-    null = np.column_stack([trials.is_null(name) for name in CHECKED])
-    success, as_demonstrated = trials.number("success"), trials.number("as_demonstrated") == 1.0
-    # few combinations are distinct
-    kinds = null @ (1 << np.arange(len(CHECKED))) * 8 + np.nan_to_num(success, nan=2.0).astype(int) * 2
-    for i in np.unique(kinds + as_demonstrated, return_index=True)[1].tolist():
-        right = None if math.isnan(success[i]) else bool(success[i])
-        if find_contradiction(null[i].tolist(), right, bool(as_demonstrated[i])):
-            return False
-    names = [name for column in NAMES for name in trials.coded(column).names if name]
-    return trials.coded("schema").names == [RECORD_SCHEMA] and not any(map(CONTROL.search, names))
-
-
-def _lines_between(file: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """Yield the lines that begin from `start` to before `end` bytes, without an incomplete last line."""
-    position = max(0, start - 1)
-    file.seek(position)
-    position += len(file.readline()) if start else 0  # the line that begins before, or its end
-    for line in file:
-        if position >= end or not line.endswith(b"\n"):
-            return
-        yield line
-        position += len(line)
-
-
-def _batched(items: Iterable[Any]) -> Iterator[list[Any]]:
+def iterate_batches(items: Iterable[Any]) -> Iterator[list[Any]]:
     """Yield lists of at most `_CHUNK` items."""
     left = iter(items)
     while batch := list(islice(left, _CHUNK)):
         yield batch
 
 
-def _columns_of(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping[str, Any]]) -> Trials:
+def make_columns(values: Mapping[str, Sequence[Any]], predicted: Sequence[Mapping[str, Any]]) -> Trials:
     """Return columns of values, with None where a record has no value, and of failure predictions."""
     every = {**values, **{name: [each.get(key) for each in predicted] for name, key in _PREDICTED.items()}}
     columns: dict[str, Numbers | CodedColumn] = {}
@@ -330,7 +255,7 @@ def _shorten(column: Array) -> Numbers:
     return half if np.array_equal(half, column, equal_nan=True) else column
 
 
-def _join(parts: Sequence[Trials]) -> Trials:
+def join_trials(parts: Sequence[Trials]) -> Trials:
     """Return all trials of several parts, in their order."""
     if len(parts) == 1:
         return parts[0]

@@ -24,7 +24,8 @@ from apo_bench.geometry import Array
 from apo_bench.records import KEY, SETTINGS, describe_secret_seed, get_record_key
 from apo_bench.records.run.replay_command import format_replay_command
 from apo_bench.records.run.run_file import list_scenario_files, read_limits, read_run
-from apo_bench.records.run.trials import Index, Mask, Trials, pair_groups, read_trials
+from apo_bench.records.run.trial_reader import read_trials
+from apo_bench.records.run.trials import Index, Mask, Trials, pair_groups
 
 _ENDING = ("success", "failure_stage", "failure_code")  # columns that must agree for the same ending
 _RESULT = (  # columns that must agree for identical trials
