@@ -1,7 +1,7 @@
 """The table that `evaluate` returns: success rates by condition, with exports and plots."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import copyfile
@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, final
 
 from apo_bench.errors import missing_package, require
-from apo_bench.io import format_count
+from apo_bench.io import align_columns, format_count
 from apo_bench.records import TrialRecord
 
 RUN_FILES = ("run.json", "trials.jsonl", "timing.jsonl")
@@ -42,8 +42,8 @@ class RateTable:
     def __str__(self) -> str:
         """The table as text with aligned columns, and the error of each method that raised one."""
         table = self._table()
-        words = [column.words for column in table.shown]
-        lines = _align_cells([[column.head for column in table.shown], *table.lines], words)
+        numbers = [i for i, column in enumerate(table.shown) if not column.words]
+        lines = align_columns([[column.head for column in table.shown], *table.lines], numbers)
         return "\n".join((*lines, *self._describe_errors()))
 
     def to_pandas(self) -> Any:
@@ -115,11 +115,3 @@ class RateTable:
         ranks = {method: rank for rank, method in enumerate(self.methods)}
         by_method = sorted(tally(self.records), key=lambda cell: ranks.get(cell.method, len(ranks)))
         return make_condition_table(sorted(by_method, key=make_settings_key))
-
-
-def _align_cells(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:
-    """Yield lines of cells as aligned text: columns with `words` to the left, numbers to the right."""
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
-        cells = zip(line, widths, words, strict=True)
-        yield "  ".join(cell.ljust(width) if left else cell.rjust(width) for cell, width, left in cells).rstrip()

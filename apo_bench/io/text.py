@@ -1,6 +1,6 @@
 """Format words, lists and aligned columns."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -23,10 +23,15 @@ def join_words(words: Iterable[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def align_columns(table: Sequence[Sequence[str]]) -> list[str]:
-    """Return the rows of a table as lines with aligned columns."""
+def align_columns(table: Sequence[Sequence[str]], numbers: Collection[int] = ()) -> list[str]:
+    """Return the rows of a table as lines with aligned columns.
+
+    Args:
+        numbers: Indices of the columns that are aligned to the right.
+    """
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in table]
+    pads = [str.rjust if i in numbers else str.ljust for i in range(len(widths))]
+    return ["  ".join(pad(cell, w) for pad, cell, w in zip(pads, row, widths, strict=True)).rstrip() for row in table]
 
 
 def format_direction(v: Array) -> str:
