@@ -47,7 +47,7 @@ def dataset_make(
     record: Annotated[str, typer.Option(help="replays, or insertions (APOInsert-v0 with a policy).")] = "replays",
     policy: Annotated[
         str | None,
-        typer.Option(help="Policy of insertions: expert (default), straight, dagger-insert, or package.module:name."),
+        typer.Option(help="Policy of insertions: expert (default), straight, spiral, searcher, probe, or module:name."),
     ] = None,
     **options: Any,
 ) -> None:

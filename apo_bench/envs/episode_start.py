@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -50,20 +51,23 @@ class EpisodeStart:
         """The stated covariance of this operation, (6, 6)."""
         return np.asarray(self.covariances[self.start.operation])
 
-    def off(self, control: TipControl) -> Array:
-        """Return the error of the part relative to its neighbours where they stand now, as `TipControl.off` does."""
+    @cached_property
+    def _goals(self) -> tuple[tuple[str, str, Array], ...]:
+        """Each pair of a held part and a standing one, and where the held one belongs in the frame of the other."""
         assembly = self.plan.assembly
         k = self.start.operation
-        operation = assembly.operations[k]
         true = compute_placements(assembly, self.plan.start, self.poses)[k]
+        contacts = assembly.operations[k].contacts
+        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in contacts})
+        return tuple((held, there, pose.inverse(true[there]) @ true[held]) for held, there in pairs)
+
+    def off(self, control: TipControl) -> Array:
+        """Return the error of the part relative to its neighbours where they stand now, as `TipControl.off` does."""
+        main = self.plan.assembly.operations[self.start.operation].main
         now = control.poses()
-        # for each pair of held part and standing part: where the held part belongs, as a displacement from
-        # its present pose
-        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
-        wanted = [
-            now[there] @ pose.inverse(true[there]) @ true[held] @ pose.inverse(now[held]) for held, there in pairs
-        ]
-        return control.off([T @ now[operation.main] for T in wanted])
+        return control.off(
+            [now[there] @ goal @ pose.inverse(now[held]) @ now[main] for held, there, goal in self._goals]
+        )
 
 
 class TrialStarts(NamedTuple):

@@ -1,6 +1,7 @@
 """Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
 from apo_bench.simulation.scene.composing import HANDS
+from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
@@ -12,6 +13,7 @@ from apo_bench.simulation.scene.render import (
     place_for_picture,
     save_film,
 )
+from apo_bench.simulation.scene.scaled_physics import PhysicsScale, ScaledPhysics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import (
     WRIST_SENSORS,
@@ -30,11 +32,16 @@ from apo_bench.simulation.scene.world import (
     use_timestep,
     wake,
 )
+from apo_bench.simulation.scene.wrist_camera import WRIST_CAMERA
 
 __all__ = (
     "HANDS",
+    "WRIST_CAMERA",
     "WRIST_SENSORS",
+    "KeptRenderer",
     "Marks",
+    "PhysicsScale",
+    "ScaledPhysics",
     "Scene",
     "ShiftArrows",
     "TurnRing",

@@ -25,7 +25,14 @@ from apo_bench.simulation.execution import (
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, translate
-from apo_bench.simulation.scene import Scene, allow_sleep, get_part_pose, switch_wrist_sensors_on, take_snapshot
+from apo_bench.simulation.scene import (
+    Scene,
+    allow_sleep,
+    get_part_pose,
+    switch_wrist_sensors_on,
+    take_snapshot,
+    touches_others,
+)
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -184,6 +191,31 @@ class TipControl:
         """Return the true poses of all parts, (4, 4) each, world, for observers only; no command depends on them."""
         work = self.robot.scene.work
         return {**self.start.parts, **{part: get_part_pose(work, self.robot.data, part) for part in work.free}}
+
+    @property
+    def left(self) -> float:
+        """Distance from the end of the line to the goal, [m]; above 0 if the grip changes there."""
+        return self._left
+
+    @property
+    def hole(self) -> Array:
+        """Where the front of the part ends by the robot's own estimate, (3,), world, [m]."""
+        return np.asarray(pose.apply(self._end, self._front[None])[0])
+
+    @property
+    def in_free_air(self) -> bool:
+        """Whether the approach has met no contact yet."""
+        return self._stopped is None
+
+    @property
+    def contact_force(self) -> Array:
+        """The true contact force on the held parts, (3,), in the frame of the insertion axis, [N]; for observers."""
+        return np.asarray(np.array(self._force) @ self._R)
+
+    @property
+    def touches(self) -> bool:
+        """Whether the held parts touch anything but the hand, for observers only."""
+        return touches_others(self.robot.scene.work, self.robot.data, self.robot.forces.held)
 
     @property
     def force_n(self) -> float:
