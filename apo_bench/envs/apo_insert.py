@@ -124,8 +124,9 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     something collides or is dropped. After `horizon` actions it is truncated: the hand opens and the judge decides.
 
     `info` of each step: `success` and `success_at_end`, False before the end; `success_once`, whether the part was
-    fully inserted at any moment, or the judge says so; `phase`: `approach`, `contact`, `inside`, `arrived` or `released`; `force_n`,
-    filtered; `depth_mm`, the true depth in the hole. The last one also has `is_success`, `code` and `sentence`.
+    fully inserted at any moment, or the judge says so; `phase`: `approach`, `contact`, `inside`, `arrived` or
+    `released`; `force_n`, filtered; `depth_mm`, the true depth in the hole. The last one also has `is_success`, `code`
+    and `sentence`.
 
     ## Arguments
     - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as in
