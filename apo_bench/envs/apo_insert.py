@@ -236,6 +236,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         )
         self._residual = bool(residual)
         self._gripper = bool(gripper)
+        self.action_size = 7 if self._gripper else 6
+        """How many numbers an action has."""
         self.target = TipTarget(to_twist(shift_mm, turn_deg), to_twist(reach_mm, reach_deg))
         """The displacement of the tip by the actions of this episode."""
         self._horizon = int(horizon)
@@ -260,7 +262,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._best = 0.0  # smallest distance left along the insertion axis, [m]
         self._progress = InsertionProgress(0.0, 0.0, 0.0)
         self.observation_space = insert_space(self._cameras, self._critic)
-        self.action_space = spaces.Box(-1.0, 1.0, (7 if self._gripper else 6,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
 
     @property
     def trial(self) -> int:
@@ -365,7 +367,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over; call reset() for the next one.")
-        given = read_action(action, *self.action_space.shape)
+        given = read_action(action, self.action_size)
         control = self._at_work()
         self._actions.append(given)
         shared = 0.0

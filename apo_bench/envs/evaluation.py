@@ -12,8 +12,8 @@ from apo_bench.names import resolve
 REASONS = ("never entered", "stopped inside", "moved parts", "out of time", "force")
 """Why an episode fails.
 
-The part was never in the hole; it was, but the hand opened too early; it was fully inserted, but parts do not stand
-where they belong; time ran out inside of the hole; force or a collision ended the episode.
+The part was never in the hole; it was, but the hand opened too early; it moved parts that stood in their places; time
+ran out inside of the hole; force or a collision ended the episode.
 """
 _ENTERED_MM = 1.0
 _FORCED = ("force_stop", "collision", "lost_grasp", "unstable_simulation")
@@ -93,7 +93,7 @@ def find_reason(info: dict[str, Any], deepest_mm: float, truncated: bool) -> str
     """
     if info["code"] in _FORCED:
         return "force"
-    if info["success_once"]:
+    if info["success_once"] or info["code"] == "pushed":
         return "moved parts"
     if deepest_mm < _ENTERED_MM:
         return "never entered"

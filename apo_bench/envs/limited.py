@@ -25,4 +25,4 @@ def make_assemble(**settings: Any) -> Any:
 
 
 for _make in (make_insert, make_assemble):
-    _make.metadata = APOInsert.metadata  # Gymnasium reads the render modes of an entry point
+    vars(_make)["metadata"] = APOInsert.metadata  # Gymnasium reads the render modes of an entry point

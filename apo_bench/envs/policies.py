@@ -40,7 +40,7 @@ _GAIN = 0.5
 
 def straight(env: APOInsert) -> Policy:
     """Add nothing to the scripted approach."""
-    still = np.zeros(env.action_space.shape, np.float32)
+    still = np.zeros(env.action_size, np.float32)
     return lambda observation: still
 
 
@@ -57,7 +57,7 @@ def expert(env: APOInsert) -> Policy:
 
 def with_hand(env: APOInsert, action: Array) -> Array:
     """Return six numbers as an action of an environment, whose hand is left to the approach."""
-    return np.concatenate([action, np.zeros(len(env.action_space.low) - 6)])
+    return np.concatenate([action, np.zeros(env.action_size - 6)])
 
 
 def insert_env(settings: TrialConfig, policy: str = "straight", **more: Any) -> APOInsert:

@@ -69,8 +69,10 @@ class Searcher:
         return with_hand(self._env, action)
 
     def _approach(self, left: float, deviations: Array) -> float:
-        """Leave the motion to the approach until contact stops it."""
-        if self._waited >= _STALLED and left > _NEAR_MM:
+        """Leave the motion to the approach until contact stops it, or walls rub."""
+        if math.hypot(*self._force[:2]) > _RUB_N:
+            self._phase = self._go_in
+        elif self._waited >= _STALLED and left > _NEAR_MM:
             self._press = max(-float(self._force[2]), 0.1)
             self._begin_search(left)
         return 0.0
