@@ -1,12 +1,13 @@
 """Images of an episode of `APOInsert-v0`, by renderers that are kept between them."""
 
+import math
 from typing import Any, final
 
 from apo_bench.simulation.scene import WRIST_CAMERA, KeptRenderer, Scene, aim_camera
 from apo_bench.simulation.task.tip_control import TipControl
 
-_SCENE_CAMERA = (0.3, 150.0, -30.0)
-"""Distance from the estimated hole, [m], azimuth and elevation, [deg], of the camera `scene`."""
+_SCENE_CAMERA = (0.22, 40.0, -25.0)
+"""Distance from the estimated entrance of the hole, [m]; azimuth against the insertion and elevation, [deg]."""
 
 
 @final
@@ -28,7 +29,13 @@ class EpisodePictures:
             self._scene = scene
         if (width, height) not in self._kept:
             self._kept[width, height] = KeptRenderer(scene.work.model, width, height)
-        where: Any = {"scene": aim_camera(control.hole, *_SCENE_CAMERA), "wrist": WRIST_CAMERA}.get(camera, camera)
+        distance, beside, elevation = _SCENE_CAMERA
+        x, y, _ = control.start.direction
+        ahead = math.degrees(math.atan2(y, x))  # a view along the insertion
+        where: Any = {
+            "scene": aim_camera(control.entrance, distance, ahead + beside, elevation),
+            "wrist": WRIST_CAMERA,
+        }.get(camera, camera)
         return self._kept[width, height].draw(control.robot.data, where)
 
     def close(self) -> None:

@@ -9,9 +9,9 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame, quaternion, rotation
 
 WRIST_CAMERA = "wrist"
-_PLACE_M = (0.0, -0.10, -0.13)  # of the camera, in the frame of the tip, whose z axis points ahead
-_LOOKS_AT_M = (0.0, 0.01, 0.0)  # the middle of its picture, in the same frame
-_FIELD_DEG = 55.0  # vertical field of view
+_PLACE_M = (0.0, 0.07, -0.12)  # of the camera, in the frame of the tip: z points ahead, level insertions go along y
+_LOOKS_AT_M = (0.0, 0.06, 0.03)  # the middle of its picture, in the same frame
+_FIELD_DEG = 75.0  # vertical field of view
 
 
 def add_wrist_camera(spec: Any, kinematics: Kinematics) -> None:
@@ -33,5 +33,5 @@ def _place() -> Array:
     """Return the pose of the camera in the frame of the tip, (4, 4); it looks along its negative z axis."""
     back = np.array(_PLACE_M) - np.array(_LOOKS_AT_M)
     back /= np.linalg.norm(back)
-    across = np.array([1.0, 0.0, 0.0])
+    across = np.array([-1.0, 0.0, 0.0])
     return pose.rigid(np.column_stack([across, np.cross(back, across), back]), np.array(_PLACE_M))

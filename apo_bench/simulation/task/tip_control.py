@@ -199,9 +199,11 @@ class TipControl:
         return self._left
 
     @property
-    def hole(self) -> Array:
-        """Where the front of the part ends by the robot's own estimate, (3,), world, [m]."""
-        return np.asarray(pose.apply(self._end, self._front[None])[0])
+    def entrance(self) -> Array:
+        """The entrance of the hole by the robot's own estimate, (3,), world, [m]; without one, where the part ends."""
+        end = pose.apply(self._end, self._front[None])[0]
+        deep = max(self.start.transfer.entrances, default=self._left) - self._left
+        return np.asarray(end - deep * self.start.transfer.into.direction)
 
     @property
     def in_free_air(self) -> bool:
