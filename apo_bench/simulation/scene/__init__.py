@@ -4,6 +4,7 @@ from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
+    build_data,
     build_data_with_arm,
     check_film,
     copy_data,
@@ -40,6 +41,7 @@ __all__ = (
     "TurnRing",
     "World",
     "aim_camera",
+    "build_data",
     "allow_sleep",
     "build_data_with_arm",
     "build_scene",

@@ -1,0 +1,121 @@
+"""Photographs of parts: colours by rendering; depth and masks by ray casts, which need no graphics."""
+
+import copy
+from collections.abc import Mapping
+from typing import Any, NamedTuple, final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Poses
+from apo_bench.geometry import Array, collect_corners, pose
+from apo_bench.perception.depth_camera.range_finder import PinholeView
+from apo_bench.simulation.graphics import renderer
+from apo_bench.simulation.scene import Scene, aim_camera, build_data
+from apo_bench.simulation.sensor.rays import ModelRays
+
+_MARGIN_PX = 2
+"""Pixels around the projected corners of a part in which its silhouette is looked for."""
+_NEAREST_M = 1e-3
+"""Depth at which a part in front of the image plane begins."""
+
+Masks = NDArray[np.bool_]
+
+
+class Photograph(NamedTuple):
+    """One image of a scene."""
+
+    rgb: NDArray[np.uint8] | None
+    """(height, width, 3); None without graphics."""
+    depth: Array
+    """(height, width), along the optical axis, [m]; infinite where nothing is."""
+    visible: Mapping[str, Masks]
+    """Movable part -> pixels that show it, (height, width)."""
+    whole: Mapping[str, Masks]
+    """Movable part -> pixels that would show it without the others, (height, width)."""
+
+
+@final
+class Photographer:
+    """Takes photographs of the parts of a scene without hands and arm."""
+
+    def __init__(self, scene: Scene, view: PinholeView, colours: bool = True) -> None:
+        """Prepare to take photographs of one size and opening angle.
+
+        Args:
+            scene: From `build_scene`.
+            view: Any view with this size and angle.
+            colours: Whether to render colours, which needs graphics.
+
+        Raises:
+            InputError: No graphics driver can be used.
+        """
+        self._scene = scene
+        self._cast = ModelRays(scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm)
+        self._renderer = None
+        if colours:
+            model = copy.copy(scene.shown.model)  # the opening angle of free cameras is a setting of the model
+            model.vis.global_.fovy = view.fov_deg
+            self._renderer = renderer(model, view.width, view.height)
+
+    def take(self, view: PinholeView, poses: Poses) -> Photograph:
+        """Take a photograph of parts at these poses, (4, 4), world, [m]; others are at their start."""
+        every = {**self._scene.scenario.start, **poses}
+        shape = view.height, view.width
+        distance, index = self._cast(every, view.origin, view.rays)
+        names = list(every)
+        movable = self._scene.shown.free
+        visible = {part: (index == names.index(part)).reshape(shape) for part in movable}
+        return Photograph(
+            self._render(view, every),
+            (distance * (view.rays @ view.T_world_view[:3, 2])).reshape(shape),
+            visible,
+            {part: self._silhouette(view, part, every[part]) for part in movable},
+        )
+
+    def close(self) -> None:
+        """Free the renderer, before another one is made."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _render(self, view: PinholeView, poses: Poses) -> NDArray[np.uint8] | None:
+        """Render the colours with a free camera, whose image is upright as that of `look_at`."""
+        if self._renderer is None:
+            return None
+        forward = view.T_world_view[:3, 2]
+        azimuth = np.degrees(np.arctan2(forward[1], forward[0]))
+        elevation = np.degrees(np.arcsin(forward[2]))
+        camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
+        self._renderer.update_scene(build_data(self._scene.shown, self._scene, poses), camera=camera)
+        _roll(self._renderer.scene, view)
+        return np.array(self._renderer.render())
+
+    def _silhouette(self, view: PinholeView, part: str, T: Array) -> Masks:
+        """The pixels that show a part alone, (height, width)."""
+        mask = np.zeros((view.height, view.width), dtype=np.bool_)
+        corners = pose.apply(T, collect_corners(self._scene.pieces[part])[0])
+        rows, columns = _frame_points(view, corners)
+        pixels = np.arange(mask.size).reshape(mask.shape)[rows, columns]
+        _, index = self._cast({part: T}, view.origin, view.rays[pixels.ravel()])
+        mask[rows, columns] = (index == 0).reshape(pixels.shape)
+        return mask
+
+
+def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
+    """Give both eyes of MuJoCo's camera the exact upward direction of a view, which may be rolled."""
+    for camera in scene.camera:
+        camera.up = -view.T_world_view[:3, 1]
+
+
+def _frame_points(view: PinholeView, points: Array) -> tuple[slice, slice]:
+    """The rows and columns of the image around points (k, 3), world; all of them if a point is behind the camera."""
+    local = pose.apply(pose.inverse(view.T_world_view), points)
+    if local[:, 2].min() < _NEAREST_M:
+        return slice(0, view.height), slice(0, view.width)
+    pixels = local[:, :2] / local[:, 2:] * view.focal + (view.width / 2, view.height / 2)
+    low = np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_PX
+    high = np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_PX
+    (left, top), (right, bottom) = (np.clip(each, 0, (view.width, view.height)) for each in (low, high))
+    return slice(top, bottom), slice(left, right)
