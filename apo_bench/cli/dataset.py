@@ -16,7 +16,9 @@ from apo_bench.cli.shared import (
     Command,
     ScenarioArgument,
     add_options,
+    check_output,
     make_group,
+    make_path_argument,
     make_path_option,
     make_trial_options,
     name_write_errors,
@@ -168,3 +170,22 @@ def _make_images(
             say=partial(typer.echo, err=True),
         )
     typer.echo(f"Images of {format_count(made, 'trial')} in {out}; {out / 'README.md'} describes them")
+
+
+@commands.command("estimate", cls=Command)
+def dataset_estimate(
+    images: Annotated[Path, make_path_argument("IMAGES", "Folder of `dataset make --format bop`.")],
+    *,
+    out: Annotated[Path, make_path_option("Results file (BOP format) in the folder of the images: .csv.")],
+) -> None:
+    """Estimate the poses of parts in images: models are fitted to the depth of each detection, without weights.
+
+    Examples:
+      apo-bench dataset estimate images --out images/icp.csv
+      apo-bench score contact --poses images/icp.csv --out icp.json
+    """
+    from apo_bench.benchmark.datasets.images.estimate import estimate_poses
+
+    check_output(out, "--out", ".csv")
+    made = estimate_poses(images, out)
+    typer.echo(f"{format_count(made, 'estimate')} in {out}")

@@ -61,14 +61,16 @@ def score_command(
     ] = None,
     estimator: Annotated[
         Path | None,
-        make_path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`; with --poses, the "
-            "errors that observations state."),
+        make_path_option(
+            "Noise file of `noise fit`: score this pose estimator, by default in the track `measured`; with --poses, "
+            "the errors that observations state."
+        ),
     ] = None,
     poses: Annotated[
         Path | None,
         make_path_option(
-            "Results file (BOP format) of a pose estimator, in the folder of the images of `dataset make --format bop`: "
-            "replay its poses as they are, corrected by METHOD, and next to the true ones."
+            "Results file (BOP format) of a pose estimator, in a folder of `dataset make --format bop`: replay its "
+            "poses as they are, and corrected by METHOD."
         ),
     ] = None,
     deviation_mm: DeviationMm = None,

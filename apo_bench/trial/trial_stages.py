@@ -42,7 +42,7 @@ LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE, TV, REOBSERVE, HAND_EYE
 SAG, BASE_TILT, FINGER, FT_DRIFT, IMAGES = range(12, 17)
 """Random streams of a trial, one per source of randomness; renumbering them changes all trials.
 
-`ARM` is reserved. `WRENCH` is the noise of the force-torque sensor, `IMAGES` the cameras and depth noise of a data set of
+`ARM` is reserved. `WRENCH` is the noise of the force-torque sensor. `IMAGES` draws the cameras and the depth noise of
 images. The others from `HAND_EYE` on are the errors of the robot.
 """
 _DRIFT_NM = 0.05

@@ -45,8 +45,9 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
     Args:
         given: A name of `NOISES`; one of `FAILURES` with its rates (`flips:p=0.1/r=0.5`); `"package.module:name"`; a
             noise file (`.toml`, the name of one in the package, or `"empirical:"` and a file of residuals); `"poses:"`
-            and a results file of the BOP format; or an object. A class is instantiated with the noise level. A function `(assembly, shown, rng) -> Observation` is
-            used unchanged, and a function `(poses, rng) -> poses` needs attributes `deviation_mm`, `deviation_deg`.
+            and a results file of the BOP format; or an object. A class is instantiated with the noise level. A function
+            `(assembly, shown, rng) -> Observation` is used unchanged, and a function `(poses, rng) -> poses` needs
+            attributes `deviation_mm`, `deviation_deg`.
         noise_level: Standard deviation per axis, [mm, degrees].
 
     Raises:

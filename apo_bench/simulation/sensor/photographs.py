@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
-from apo_bench.geometry import Array, collect_corners, pose
+from apo_bench.geometry import Array, Ints, collect_corners, pose
 from apo_bench.perception.depth_camera.range_finder import PinholeView
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, aim_camera, build_data
@@ -20,7 +20,20 @@ _MARGIN_PX = 2
 _NEAREST_M = 1e-3
 """Depth at which a part in front of the image plane begins."""
 
-Masks = NDArray[np.bool_]
+Mask = NDArray[np.bool_]
+Box = tuple[int, int, int, int]
+"""Left, top, width and height, [pixels]."""
+
+
+class Silhouette(NamedTuple):
+    """The pixels that would show a part without the others."""
+
+    mask: Mask
+    """(height, width), those in the image."""
+    pixels: int
+    """How many there are, also outside the image."""
+    box: Box
+    """The box around them, which may reach beyond the image."""
 
 
 class Photograph(NamedTuple):
@@ -30,10 +43,10 @@ class Photograph(NamedTuple):
     """(height, width, 3); None without graphics."""
     depth: Array
     """(height, width), along the optical axis, [m]; infinite where nothing is."""
-    visible: Mapping[str, Masks]
+    visible: Mapping[str, Mask]
     """Movable part -> pixels that show it, (height, width)."""
-    whole: Mapping[str, Masks]
-    """Movable part -> pixels that would show it without the others, (height, width)."""
+    whole: Mapping[str, Silhouette]
+    """Movable part -> its silhouette."""
 
 
 @final
@@ -92,15 +105,17 @@ class Photographer:
         _roll(self._renderer.scene, view)
         return np.array(self._renderer.render())
 
-    def _silhouette(self, view: PinholeView, part: str, T: Array) -> Masks:
-        """The pixels that show a part alone, (height, width)."""
-        mask = np.zeros((view.height, view.width), dtype=np.bool_)
+    def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
+        """The pixels that show a part alone."""
         corners = pose.apply(T, collect_corners(self._scene.pieces[part])[0])
-        rows, columns = _frame_points(view, corners)
-        pixels = np.arange(mask.size).reshape(mask.shape)[rows, columns]
-        _, index = self._cast({part: T}, view.origin, view.rays[pixels.ravel()])
-        mask[rows, columns] = (index == 0).reshape(pixels.shape)
-        return mask
+        (left, top), (right, bottom) = _frame_points(view, corners)
+        v, u = np.mgrid[top:bottom, left:right]
+        _, index = self._cast({part: T}, view.origin, view.cast_through(u, v))
+        rows, columns = (each.ravel()[index == 0] for each in (v, u))
+        mask = np.zeros((view.height, view.width), dtype=np.bool_)
+        inside = (rows >= 0) & (rows < view.height) & (columns >= 0) & (columns < view.width)
+        mask[rows[inside], columns[inside]] = True
+        return Silhouette(mask, len(rows), find_box(rows, columns))
 
 
 def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
@@ -109,13 +124,23 @@ def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
         camera.up = -view.T_world_view[:3, 1]
 
 
-def _frame_points(view: PinholeView, points: Array) -> tuple[slice, slice]:
-    """The rows and columns of the image around points (k, 3), world; all of them if a point is behind the camera."""
+def _frame_points(view: PinholeView, points: Array) -> Ints:
+    """The left upper and right lower pixel around points (k, 3), world, (2, 2), each column and row.
+
+    It ends one image beyond the image, or there if a point is behind the camera.
+    """
+    size = np.array([view.width, view.height])
     local = pose.apply(pose.inverse(view.T_world_view), points)
     if local[:, 2].min() < _NEAREST_M:
-        return slice(0, view.height), slice(0, view.width)
-    pixels = local[:, :2] / local[:, 2:] * view.focal + (view.width / 2, view.height / 2)
-    low = np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_PX
-    high = np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_PX
-    (left, top), (right, bottom) = (np.clip(each, 0, (view.width, view.height)) for each in (low, high))
-    return slice(top, bottom), slice(left, right)
+        return np.array([-size, 2 * size])
+    pixels = local[:, :2] / local[:, 2:] * view.focal + size / 2
+    ends = np.floor(pixels.min(axis=0)) - _MARGIN_PX, np.ceil(pixels.max(axis=0)) + _MARGIN_PX
+    return np.clip(np.array(ends).astype(np.int64), -size, 2 * size)
+
+
+def find_box(rows: NDArray[Any], columns: NDArray[Any]) -> Box:
+    """The box around pixels, (n,) rows and columns: left, top, width and height; all -1 without pixels."""
+    if not len(rows):
+        return (-1, -1, -1, -1)
+    left, top = int(columns.min()), int(rows.min())
+    return left, top, int(columns.max()) - left + 1, int(rows.max()) - top + 1

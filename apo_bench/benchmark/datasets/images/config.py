@@ -3,18 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
 from types import MappingProxyType
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.depth_camera.range_finder import PinholeView, look_at
-from apo_bench.perception.observation.models.camera import (
-    CAMERA_AZIMUTH_DEG,
-    CAMERA_ELEVATION_DEG,
-    WORKSPACE_MIDDLE_M,
-)
 from apo_bench.records import FIRST_TRAINING_TRIAL
 
 SPLITS = MappingProxyType({"test": 0, "val": FIRST_TRAINING_TRIAL})
@@ -60,7 +55,8 @@ class ImageConfig:
         default=0.0, metadata={"help": "Error of the published camera orientations, in degrees (1 sigma per axis)."}
     )
     depth_noise_mm: float = field(
-        default=1.0, metadata={"help": "Noise of a depth pixel at 1 m, in mm (1 sigma); it grows with the squared depth."}
+        default=1.0,
+        metadata={"help": "Noise of a depth pixel at 1 m, in mm (1 sigma); grows with the squared depth."},
     )
     no_rgb: bool = field(default=False, metadata={"help": "Write depth and masks only, which needs no graphics."})
     randomise: bool = field(default=False, metadata={"help": "Vary camera poses, lights and background by trial."})
@@ -92,7 +88,8 @@ class ImageConfig:
 
     def draw_views(self, rng: np.random.Generator) -> tuple[ViewPair, ...]:
         """Draw the cameras of a trial: published and true ones."""
-        return tuple(self._draw_pair(camera, rng.uniform(-1.0, 1.0, 3), rng.standard_normal(6)) for camera in range(self.cameras))
+        drawn = [(rng.uniform(-1.0, 1.0, 3), rng.standard_normal(6)) for _ in range(self.cameras)]
+        return tuple(self._draw_pair(camera, *chance) for camera, chance in enumerate(drawn))
 
     def _draw_pair(self, camera: int, change: Array, error: Array) -> ViewPair:
         """One camera of a trial.
@@ -101,13 +98,14 @@ class ImageConfig:
             change: (3,), from -1 to 1, of azimuth, elevation and distance.
             error: (6,), standard normal, of the calibration.
         """
+        from apo_bench.perception.observation.models import camera as usual
+
         change = change * self.randomise
-        azimuth, elevation = np.radians(
-            (CAMERA_AZIMUTH_DEG + 360.0 / self.cameras * camera, CAMERA_ELEVATION_DEG) + _SPREAD_DEG * change[:2]
-        )
+        usual_deg = usual.CAMERA_AZIMUTH_DEG + 360.0 / self.cameras * camera, usual.CAMERA_ELEVATION_DEG
+        azimuth, elevation = np.radians(usual_deg + _SPREAD_DEG * change[:2])
         away = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
         reach = 1e-3 * self.distance_mm * (1.0 + _SPREAD * change[2])
-        T = look_at(WORKSPACE_MIDDLE_M + reach * away, WORKSPACE_MIDDLE_M)
+        T = look_at(usual.WORKSPACE_MIDDLE_M + reach * away, usual.WORKSPACE_MIDDLE_M)
         sigma = np.repeat([1e-3 * self.camera_error_mm, np.radians(self.camera_error_deg)], 3)
         return ViewPair(self.view(T), self.view(T @ pose.exp(sigma * error)))
 

@@ -77,9 +77,7 @@ def make_images(
     write_file(out / "camera.json", json.dumps(_describe_camera(config), indent=1))
     write_file(out / "README.md", _CARD.format(version=__version__, command=command))
     left = [
-        (number, trial)
-        for number, trial in enumerate(trials, start=1)
-        if not (out / split / f"{number:06d}").is_dir()
+        (number, trial) for number, trial in enumerate(trials, start=1) if not (out / split / f"{number:06d}").is_dir()
     ]
     batches = [
         several[first : first + _BATCH]
@@ -118,9 +116,7 @@ def describe_images(
     scenes = {}
     for number, trial in enumerate(trials, start=1):
         scenario = loaded[trial.scenario]
-        parts = {
-            part: objects[_find_object(scenario, part, trial.clearance_mm)] for part in _list_movable(scenario)
-        }
+        parts = {part: objects[_find_object(scenario, part, trial.clearance_mm)] for part in _list_movable(scenario)}
         images = {
             str(image): ImageEntry(operation, camera)
             for image, operation, camera in number_images(len(scenario.assembly), config.cameras)

@@ -14,7 +14,7 @@ from apo_bench.benchmark.datasets.images.config import ImageConfig, ViewPair, nu
 from apo_bench.formats.bop_images import CAMERAS, ImageDescription, SceneEntry
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.depth_camera.range_finder import BIAS
-from apo_bench.simulation.sensor.photographs import Masks, Photograph, Photographer
+from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photographer, Silhouette, find_box
 
 DETECTIONS = "scene_detections.json"
 """The detections of one scene; those of all scenes are joined in the folder of the data set."""
@@ -72,7 +72,7 @@ def write_scene(
         photograph = photographer.take(views[camera].true, poses)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
-        _describe_image(photograph, views[camera], poses, (number, image), description, files)
+        _describe_image(photograph, depth, views[camera], poses, (number, image), description, files)
     written = {CAMERAS: files.camera, DETECTIONS: files.detections}
     if not is_secret:
         written |= {
@@ -105,8 +105,9 @@ def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path,
     _write_png(out / "depth" / f"{image:06d}.png", np.round(steps).astype(np.uint16))
     if photograph.rgb is not None:
         _write_png(out / "rgb" / f"{image:06d}.png", photograph.rgb)
-    for folder, masks in (("mask_visib", photograph.visible), ("mask", photograph.whole)):
-        for entry, mask in enumerate(() if is_secret else masks.values()):
+    whole = [each.mask for each in photograph.whole.values()]
+    for folder, masks in (("mask_visib", photograph.visible.values()), ("mask", whole)):
+        for entry, mask in enumerate(() if is_secret else masks):
             _write_png(out / folder / f"{image:06d}_{entry:06d}.png", np.uint8(255) * mask.astype(np.uint8))
 
 
@@ -118,6 +119,7 @@ def _write_png(path: Path, pixels: NDArray[Any]) -> None:
 
 def _describe_image(
     photograph: Photograph,
+    depth: Array,
     view: ViewPair,
     poses: Poses,
     where: tuple[int, int],
@@ -129,6 +131,7 @@ def _describe_image(
     Detections are in the order of their boxes, which does not tell identical parts apart.
 
     Args:
+        depth: As measured, (height, width), [m].
         where: Scene and image.
     """
     scene, image = where
@@ -146,7 +149,7 @@ def _describe_image(
             {"obj_id": number, "cam_R_m2c": T[:3, :3].ravel().tolist(), "cam_t_m2c": (1e3 * T[:3, 3]).tolist()}
         )
         visible = photograph.visible[part]
-        fact = _measure_visibility(visible, photograph.whole[part] | visible, photograph.depth)
+        fact = _measure_visibility(visible, photograph.whole[part], depth)
         facts.append(fact)
         if fact["visib_fract"] >= _LEAST_VISIBLE:
             detections.append(_make_detection(scene, image, number, visible))
@@ -155,47 +158,43 @@ def _describe_image(
     files.gt_info[str(image)] = facts
 
 
-def _measure_visibility(visible: Masks, whole: Masks, depth: Array) -> dict[str, Any]:
-    """The entry of `scene_gt_info.json` of a part."""
+def _measure_visibility(visible: Mask, whole: Silhouette, depth: Array) -> dict[str, Any]:
+    """The entry of `scene_gt_info.json` of a part.
+
+    Args:
+        depth: As measured, 0 without a reading.
+    """
     return {
-        "bbox_obj": find_box(whole),
-        "bbox_visib": find_box(visible),
-        "px_count_all": int(whole.sum()),
-        "px_count_valid": int((whole & np.isfinite(depth)).sum()),
+        "bbox_obj": whole.box,
+        "bbox_visib": find_box(*np.nonzero(visible)),
+        "px_count_all": whole.pixels,
+        "px_count_valid": int((whole.mask & (depth > 0.0)).sum()),
         "px_count_visib": int(visible.sum()),
-        "visib_fract": float(visible.sum() / max(1, whole.sum())),
+        "visib_fract": float(visible.sum() / max(1, whole.pixels)),
     }
 
 
-def find_box(mask: Masks) -> list[int]:
-    """The box around a mask: left, top, width and height, [pixels]; all -1 for an empty one."""
-    if not mask.any():
-        return [-1] * 4
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return [int(x) for x in (columns[0], rows[0], columns[-1] - columns[0] + 1, rows[-1] - rows[0] + 1)]
-
-
-def _make_detection(scene: int, image: int, number: int, visible: Masks) -> dict[str, Any]:
+def _make_detection(scene: int, image: int, number: int, visible: Mask) -> dict[str, Any]:
     """A detection as pose estimators of the BOP benchmark read it."""
     return {
         "scene_id": scene,
         "image_id": image,
         "category_id": number,
-        "bbox": find_box(visible),
+        "bbox": find_box(*np.nonzero(visible)),
         "score": 1.0,
         "time": 0.0,
         "segmentation": encode_mask(visible),
     }
 
 
-def encode_mask(mask: Masks) -> dict[str, Any]:
+def encode_mask(mask: Mask) -> dict[str, Any]:
     """A mask as COCO's uncompressed run lengths, column by column; the first run is of pixels that are not set."""
     flat = mask.ravel(order="F").tolist()
     runs = [len(list(group)) for _, group in groupby(flat)]
     return {"counts": [0] * bool(flat[0]) + runs, "size": list(mask.shape)}
 
 
-def decode_mask(encoded: Mapping[str, Any]) -> Masks:
+def decode_mask(encoded: Mapping[str, Any]) -> Mask:
     """The mask of COCO's uncompressed run lengths, the inverse of `encode_mask`."""
     counts = np.array(encoded["counts"])
     flat = np.repeat(np.arange(len(counts)) % 2 == 1, counts)
