@@ -113,9 +113,9 @@ def list_grids(
     return tuple(
         SweepConfig(
             scenario,
-            clearance_mm=clearance_mm,
+            clearance_mm=(clearance_mm,),
             human_error_scale=description.human_error_scale,
-            noise=noise,
+            noise=(noise,),
             noise_level=(deviation,),
             method=methods,
             seed=min(seeds),
@@ -138,4 +138,4 @@ def _count_successes(records: Sequence[TrialRecord], methods: Sequence[str]) -> 
 
 def _count(records: Sequence[TrialRecord], scenario: str, method: str) -> Rate:
     those = [r["success"] for r in records if r["method"] == method and scenario in (r["scenario"], _ALL)]
-    return Rate(sum(those), len(those))
+    return Rate(those.count(True), len(those))

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.datasets.images.models import MODELS_INFO
 from apo_bench.formats.bop import PoseRows
-from apo_bench.formats.bop_images import ImageDescription, read_cameras
+from apo_bench.formats.bop_images import MODELS_INFO, ImageDescription, read_cameras
 from apo_bench.formats.bop_models import ObjectSymmetry, read_symmetries
 from apo_bench.geometry import Array, pose
 from apo_bench.io import read_plain
@@ -24,11 +23,9 @@ _SHARES = np.arange(1, 11) * 0.05
 _PIXELS = np.arange(1, 11) * 5.0
 """Thresholds of MSPD for an image 640 pixels wide, [pixels]; recall is the mean over them."""
 _WIDTH_PX = 640.0
-_ADD_SHARE = 0.1
+_ADD_SHARES = np.array([0.1])
 """Threshold of ADD(-S), relative to the diameter."""
 _LEAST_VISIBLE = 0.1
-_ERRORS = ("mssd", "mspd", "add")
-_THRESHOLDS = {"mssd": _SHARES, "mspd": _PIXELS, "add": np.array([_ADD_SHARE])}
 _NOTHING = ObjectSymmetry(np.eye(4)[None])
 
 
@@ -76,7 +73,7 @@ def measure_recall(folder: Path, description: ImageDescription, rows: PoseRows) 
     hits: dict[str, list[Array]] = {}
     for number, scene in description.scenes.items():
         for truth, seen, model, K in _list_targets(folder, description, int(number), rows, models):
-            errors = _compute_errors(truth, seen, model, K) * (1.0, _WIDTH_PX / width_px, 1.0)
+            errors = compute_errors(truth, seen, model, K) * (1.0, _WIDTH_PX / width_px, 1.0)
             hits.setdefault(scene.scenario, []).append(_count_hits(errors))
     recall = {}
     for scenario, found in hits.items():
@@ -93,8 +90,8 @@ def _read_models(folder: Path) -> dict[int, EvaluatedModel]:
     models = {}
     for name, entry in read_plain(place / MODELS_INFO, "sizes of models", syntax="json").items():
         number = int(name)
-        mesh = trimesh.load(place / f"obj_{number:06d}.ply", process=False)
-        vertices = np.unique(np.round(mesh.vertices, 6), axis=0)
+        mesh: Any = trimesh.load(place / f"obj_{number:06d}.ply", process=False)
+        vertices: Array = np.unique(np.round(mesh.vertices, 6), axis=0)
         models[number] = EvaluatedModel(vertices, entry["diameter"], known.get(number, _NOTHING).images)
     return models
 
@@ -120,7 +117,7 @@ def _list_targets(
             yield T, pose.rigid(rows.R[best], rows.t_mm[best]), models[number], camera.K
 
 
-def _compute_errors(truth: Array, seen: Array, model: EvaluatedModel, K: Array) -> Array:
+def compute_errors(truth: Array, seen: Array, model: EvaluatedModel, K: Array) -> Array:
     """Errors of each pair of a true pose and an estimate, (k, j, 3): MSSD / diameter, MSPD [pixels], ADD / diameter."""
     errors = np.zeros((len(truth), len(seen), 3))
     for k, T in enumerate(truth):
@@ -155,12 +152,13 @@ def _count_hits(errors: Array) -> Array:
         errors: (k, j, 3), of k true poses and j estimates, the best score first.
     """
     matched = [
-        np.mean([_match(errors[:, :, i], limit) for limit in _THRESHOLDS[name]]) for i, name in enumerate(_ERRORS)
+        np.mean([count_matches(errors[:, :, i], limit) for limit in limits])
+        for i, limits in enumerate((_SHARES, _PIXELS, _ADD_SHARES))
     ]
     return np.array([len(errors), *matched])
 
 
-def _match(errors: Array, limit: float) -> int:
+def count_matches(errors: Array, limit: float) -> int:
     """The number of true poses (k) that one of the estimates (j) is nearest to, each estimate in turn."""
     free = np.ones(len(errors), dtype=np.bool_)
     for column in errors.T:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.formats.bop_images import MODELS_INFO
 from apo_bench.geometry import (
     Array,
     Solid,
@@ -19,7 +20,6 @@ from apo_bench.geometry import (
 )
 from apo_bench.io import write_file
 
-MODELS_INFO = "models_info.json"
 _FOLDERS = "models", "models_eval"
 _FINEST = 0.08
 """Longest edge of a mesh for evaluation, relative to the diameter: errors are means over vertices."""
