@@ -164,7 +164,7 @@ def _score_poses(method: str, poses: Path, out: Path, as_json: bool, **how: Any)
     from apo_bench.io import write_file
     from apo_bench.viz.form_text import make_table
 
-    scored = score_poses(method, poses, out.with_suffix(""), **how)
+    scored = score_poses((method,), poses, out.with_suffix(""), **how)
     write_file(out, json.dumps(scored.form(), indent=1))
     if as_json:
         print_json(scored.form())

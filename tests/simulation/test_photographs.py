@@ -103,3 +103,20 @@ def test_the_box_of_no_pixel() -> None:
     nothing = np.zeros(0, dtype=int)
     assert find_box(nothing, nothing) == (-1, -1, -1, -1)
     assert find_box(np.array([3, 5]), np.array([7, 7])) == (7, 3, 1, 3)
+
+
+def test_lights_and_table_vary_and_the_scene_does_not(tower: Scene) -> None:
+    try:
+        photographer = Photographer(tower, VIEW)
+    except InputError as error:
+        pytest.skip(str(error))
+    before = tower.shown.model.geom_rgba.copy(), tower.shown.model.light_dir.copy()
+    with closing(photographer):
+        pictures = []
+        for seed in (0, 1, 0):
+            photographer.vary(np.random.default_rng(seed))
+            pictures.append(photographer.take(VIEW, place(tower)).rgb)
+    assert np.array_equal(pictures[0], pictures[2])
+    assert np.abs(pictures[0].astype(float) - pictures[1]).mean() > 5.0
+    assert np.array_equal(before[0], tower.shown.model.geom_rgba)
+    assert np.array_equal(before[1], tower.shown.model.light_dir)

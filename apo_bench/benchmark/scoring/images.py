@@ -28,11 +28,10 @@ _ALL = "all"
 class PoseScore:
     """Success of a robot with the poses of a pose estimator, and their recall."""
 
-    method: str
     results: str
     """File of the results."""
     rates: Mapping[str, Mapping[str, Rate]]
-    """Scenario, or `all` -> `uncorrected`, the method, and `oracle` -> successes among trials."""
+    """Scenario, or `all` -> `uncorrected`, the methods, and `oracle` -> successes among trials."""
     recall: Mapping[str, PoseRecall]
     """Scenario -> recall of the poses; empty if the true poses are secret."""
 
@@ -63,12 +62,12 @@ class PoseScore:
 
     def form(self) -> dict[str, Any]:
         """The score as JSON."""
-        return {"schema": SCHEMA, "method": self.method, "results": self.results, "rows": self.list_rows()}
+        return {"schema": SCHEMA, "results": self.results, "rows": self.list_rows()}
 
 
 @check_arguments
 def score_poses(
-    method: str,
+    methods: Sequence[str],
     results: str | Path,
     records: str | Path,
     *,
@@ -78,10 +77,10 @@ def score_poses(
 ) -> PoseScore:
     """Replay the trials of a data set of images with the poses of a pose estimator.
 
-    Every trial runs uncorrected, with the method, and with the true poses.
+    Every trial runs uncorrected, with each method, and with the true poses.
 
     Args:
-        method: As for `run_sweep`.
+        methods: As for `run_sweep`.
         results: A results file of the BOP format, in the folder of the data set.
         records: The folder of the records; one with records of the same trials is continued.
         deviation: Standard deviation of the poses per axis that observations state, [mm, degrees].
@@ -95,12 +94,11 @@ def score_poses(
     name += "" if estimator is None else f"{SEPARATOR}{Path(estimator).resolve()}"
     poses = make_noise(name, NoiseLevel(*deviation))
     assert isinstance(poses, PoseResults)
-    methods = tuple(dict.fromkeys((_RAW, method, _TRUE)))
-    made = run_sweep(list_grids(poses.description, methods, name, deviation), records, **how)
+    compared = tuple(dict.fromkeys((_RAW, *methods, _TRUE)))
+    made = run_sweep(list_grids(poses.description, compared, name, deviation), records, **how)
     return PoseScore(
-        method=method,
         results=str(results),
-        rates=_count_successes(made, methods),
+        rates=_count_successes(made, compared),
         recall=measure_recall(poses.folder, poses.description, poses.rows),
     )
 

@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, final
 
 import mujoco
@@ -17,6 +18,12 @@ from apo_bench.simulation.sensor.rays import ModelRays
 
 _MARGIN_PX = 2
 """Pixels around the projected corners of a part in which its silhouette is looked for."""
+_LIGHT_SPREAD = np.array([0.5, 0.5, 0.0])
+"""Varied lights: largest change of their direction, relative to its vertical component."""
+_BRIGHTNESS = 0.6, 1.3
+"""Varied lights: range of their brightness, relative to the usual one."""
+_FIXED_COLOR = 0.1, 0.95
+"""Varied colours: range of red, green and blue of the fixed parts."""
 _NEAREST_M = 1e-3
 """Depth at which a part in front of the image plane begins."""
 
@@ -66,11 +73,19 @@ class Photographer:
         """
         self._scene = scene
         self._cast = ModelRays(scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm)
-        self._renderer = None
-        if colours:
-            model = copy.copy(scene.shown.model)  # the opening angle of free cameras is a setting of the model
-            model.vis.global_.fovy = view.fov_deg
-            self._renderer = renderer(model, view.width, view.height)
+        self._world = replace(scene.shown, model=copy.copy(scene.shown.model))  # whose lights and colours may change
+        self._world.model.vis.global_.fovy = view.fov_deg  # of free cameras
+        self._renderer = renderer(self._world.model, view.width, view.height) if colours else None
+
+    def vary(self, rng: np.random.Generator) -> None:
+        """Draw other directions and brightnesses of the lights, and another colour of the fixed parts."""
+        usual = self._scene.shown.model
+        model = self._world.model
+        model.light_dir[:] = usual.light_dir + _LIGHT_SPREAD * rng.uniform(-1.0, 1.0, usual.light_dir.shape)
+        model.light_diffuse[:] = usual.light_diffuse * rng.uniform(*_BRIGHTNESS, (usual.nlight, 1))
+        model.vis.headlight.ambient[:] = usual.vis.headlight.ambient * rng.uniform(*_BRIGHTNESS)
+        is_fixed = self._world.geom_part >= len(self._world.free)
+        model.geom_rgba[is_fixed, :3] = rng.uniform(*_FIXED_COLOR, 3)
 
     def take(self, view: PinholeView, poses: Poses) -> Photograph:
         """Take a photograph of parts at these poses, (4, 4), world, [m]; others are at their start."""
@@ -101,7 +116,7 @@ class Photographer:
         azimuth = np.degrees(np.arctan2(forward[1], forward[0]))
         elevation = np.degrees(np.arcsin(forward[2]))
         camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
-        self._renderer.update_scene(build_data(self._scene.shown, self._scene, poses), camera=camera)
+        self._renderer.update_scene(build_data(self._world, self._scene, poses), camera=camera)
         _roll(self._renderer.scene, view)
         return np.array(self._renderer.render())
 

@@ -26,7 +26,7 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_true_poses_succeed_as_the_oracle_does(images: Path, tmp_path: Path) -> None:
-    exact = score_poses("contact", write_truth(images), tmp_path / "exact")
+    exact = score_poses(("contact",), write_truth(images), tmp_path / "exact")
     for rate in exact.rates["fixture_alignment"].values():
         assert (rate.successes, rate.trials) == (2, 2)
     assert exact.recall["fixture_alignment"][1:] == pytest.approx((1.0, 1.0, 1.0))
@@ -39,7 +39,7 @@ def test_wrong_poses_fail_and_are_corrected(tmp_path: Path) -> None:
         return pose.at((0.0, 0.005, 0.0)) @ T if where[1] == 3 else T
 
     path = write_truth(make(tmp_path / "set"), "shifted.csv", shift)
-    shifted = score_poses("contact", path, tmp_path / "shifted", deviation=(3, 1))
+    shifted = score_poses(("contact",), path, tmp_path / "shifted", deviation=(3, 1))
     counts = {method: rate.successes for method, rate in shifted.rates["stick_in_tower"].items()}
     assert counts == {"uncorrected": 0, "contact": 1, "oracle": 1}
 
@@ -92,8 +92,8 @@ def test_a_secret_set_is_scored_with_its_secret_only(tmp_path: Path) -> None:
     rows = [EstimatedPose((1, 1, 1), 1.0, pose.at((0.0, 0.0, 0.9)), -1.0)]
     write_results(images / "results.csv", rows)
     with pytest.raises(InputError, match="the same secret seed"):
-        score_poses("contact", images / "results.csv", tmp_path / "open")
-    scored = score_poses("contact", images / "results.csv", tmp_path / "closed", secret_seed_file=secret)
+        score_poses(("contact",), images / "results.csv", tmp_path / "open")
+    scored = score_poses(("contact",), images / "results.csv", tmp_path / "closed", secret_seed_file=secret)
     assert scored.recall == {}
     assert scored.rates["block_on_block"]["oracle"].successes == 1
     assert scored.rates["block_on_block"]["uncorrected"].successes == 0

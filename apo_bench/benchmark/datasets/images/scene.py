@@ -66,6 +66,8 @@ def write_scene(
         (out / folder).mkdir(parents=True)
     moments = list(list_moments(demonstration))
     views = config.draw_views(rng)
+    if config.randomise:
+        photographer.vary(rng)
     files = SceneFiles({}, {}, {}, [])
     for image, operation, camera in number_images(len(moments), config.cameras):
         poses = moments[operation - 1]
