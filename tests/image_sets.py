@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from apo_bench import TrialConfig, load_scenario
-from apo_bench.benchmark.datasets.images.config import ImageConfig
 from apo_bench.benchmark.datasets.images.make import make_images
 from apo_bench.formats.bop import EstimatedPose, write_results
+from apo_bench.formats.bop_images import ImageConfig
 from apo_bench.geometry import Array, pose
 
 SMALL = ImageConfig(width=160, height=120, no_rgb=True, depth_noise_mm=0.0)

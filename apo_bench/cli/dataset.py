@@ -3,15 +3,15 @@
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from inspect import Parameter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
+import msgspec
 import typer
 
-from apo_bench.benchmark.datasets.images.config import SPLITS, ImageConfig
 from apo_bench.cli.shared import (
     Command,
     ScenarioArgument,
@@ -24,7 +24,8 @@ from apo_bench.cli.shared import (
     name_write_errors,
 )
 from apo_bench.errors import require, require_known
-from apo_bench.io import format_count
+from apo_bench.formats.bop_images import ImageConfig
+from apo_bench.io import convert_typed, format_count
 from apo_bench.records import FIRST_TRAINING_TRIAL, TrialConfig, open_secret_seed
 
 _IMAGES = "bop"
@@ -39,16 +40,19 @@ Examples:
 commands = make_group("dataset", _HELP)
 _WITHOUT_EFFECT = ("noise_level", "noise", "method", "robot_error", "arm", "record", "policy")
 """Options without a meaning for images."""
+_SPLITS = ("test", "val")
+"""Splits of images; the seeds of the second are those of trials for training."""
 
 
 def _make_image_options() -> Iterator[Parameter]:
     """Yield an option for each field of `ImageConfig`; None stands for its default."""
-    for each in fields(ImageConfig):
+    hints = get_type_hints(ImageConfig, include_extras=True)
+    for each in msgspec.structs.fields(ImageConfig):
         kind: Any = type(each.default)
         default = "" if kind is bool else f" Default: {each.default:g}."
-        flag = f"--{each.name.replace('_', '-')}"
-        option = typer.Option(flag, help=f"With --format bop: {each.metadata['help']}{default}")
-        yield Parameter(each.name, Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option])
+        words = f"With --format bop: {hints[each.name].__metadata__[-1].description}{default}"
+        option = Annotated[kind | None, typer.Option(f"--{each.name.replace('_', '-')}", help=words)]
+        yield Parameter(each.name, Parameter.KEYWORD_ONLY, default=None, annotation=option)
 
 
 @commands.command("make", cls=Command)
@@ -88,29 +92,29 @@ def dataset_make(
     """Run trials and write observations, plans, true poses and frames, or images, as a data set.
 
     Examples:
-      apo-bench dataset make stick_in_tower --episodes 100 --noise-level 2 --out data
       apo-bench dataset make dovetail --format lerobot --record insertions --policy expert --out inserted
       apo-bench dataset make stick_in_tower --format bop --episodes 20 --out images
     """
-    require_known("split", split, tuple(SPLITS))
-    for name, value in (options | {"record": record, "policy": policy}).items() if format == _IMAGES else ():
+    command = shlex.join(["apo-bench", *sys.argv[1:]])
+    images = {name: value for name in ImageConfig.__struct_fields__ if (value := options.pop(name)) is not None}
+    secret = options["secret_seed_file"]
+    if format != _IMAGES:
+        only = [*images, *["secret_seed_file"] * (secret is not None)]
+        require(not only, f"--{''.join(only[:1]).replace('_', '-')} needs --format bop.")
+        trials = _list_trials(
+            (scenario, *(more or ())), options, FIRST_TRAINING_TRIAL if seed is None else seed, episodes
+        )
+        _make_episodes(trials, out, command, format, record or "replays", policy)
+        return
+    for name, value in (options | {"record": record, "policy": policy}).items():
         flag = f"--{name.replace('_', '-')}"
         require(value is None or name not in _WITHOUT_EFFECT, f"{flag} has no effect on images; leave it out.")
-    images = {each.name: value for each in fields(ImageConfig) if (value := options.pop(each.name)) is not None}
-    require(format == _IMAGES or not images, f"--{next(iter(images), '').replace('_', '-')} needs --format bop.")
-    secret = options["secret_seed_file"]
-    require(format == _IMAGES or secret is None, "--secret-seed-file needs --format bop.")
     if secret is not None:
         open_secret_seed(secret, out)  # makes it if it does not exist
-    names = (scenario, *(more or ()))
-    require(len({*names}) == len(names), "each scenario may be named once; remove the second one.")
-    first = SPLITS[split] if format == _IMAGES else FIRST_TRAINING_TRIAL
-    trials = _list_trials(names, options, first if seed is None else seed, episodes)
-    command = shlex.join(["apo-bench", *sys.argv[1:]])
-    if format == _IMAGES:
-        _make_images(trials, out, ImageConfig(**images), split, command, workers)
-    else:
-        _make_episodes(trials, out, command, format, record or "replays", policy)
+    require_known("split", split, _SPLITS)
+    first = FIRST_TRAINING_TRIAL * _SPLITS.index(split) if seed is None else seed
+    trials = _list_trials((scenario, *(more or ())), options, first, episodes)
+    _make_images(trials, out, convert_typed(images, ImageConfig, "--format bop"), split, command, workers)
 
 
 def _list_trials(names: Sequence[str], options: dict[str, Any], seed: int, episodes: int) -> list[TrialConfig]:
@@ -118,6 +122,7 @@ def _list_trials(names: Sequence[str], options: dict[str, Any], seed: int, episo
     from apo_bench import load_scenario
     from apo_bench.trial.request import Request, requested_settings
 
+    require(len({*names}) == len(names), "each scenario may be named once; remove the second one.")
     trials = []
     for name in names:
         request = Request(name, options | {"seed": seed})

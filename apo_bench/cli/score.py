@@ -95,7 +95,6 @@ def score_command(
 
     Examples:
       apo-bench score contact --out entries/contact.json
-      apo-bench score contact --results form.csv --out real.json
       apo-bench score contact --poses images/results.csv --out poses.json
     """
     from apo_bench.benchmark.scoring.entry import check_name, read_entry, write_entry
@@ -125,7 +124,7 @@ def score_command(
     out.parent.mkdir(parents=True, exist_ok=True)
     check_output(out, "--out", ".json")
     if poses is not None:
-        deviation = deviation_mm or 1.0, deviation_deg or 1.0
+        deviation = tuple(1.0 if value is None else value for value in (deviation_mm, deviation_deg))
         _score_poses(str(method), poses, out, as_json, deviation=deviation, estimator=estimator, **how)
         return
     if out.exists():

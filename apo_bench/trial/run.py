@@ -283,8 +283,12 @@ def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstrat
     model = make_noise(noise or settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
     if not isinstance(model, PoseResults):
         return model
-    if not knows_truth(settings.method):
-        model.check_human_error(settings.human_error_scale)
+    shown = model.description.human_error_scale
+    require(
+        settings.human_error_scale == shown or knows_truth(settings.method),
+        f"the human error scale {settings.human_error_scale:g} was given, and the images in '{model.folder}' show "
+        f"demonstrations with {shown:g}; give that one.",
+    )
     secret_seed = None if settings.secret_seed is None else settings.secret_seed.hash
     key = TrialKey(settings.scenario, settings.seed, settings.clearance_mm, secret_seed)
     return model.of_trial(key, plan_rotations(scene))

@@ -16,6 +16,7 @@ from apo_bench.perception.observation.models import NoiseLevel, PoseResults
 from apo_bench.perception.observation.noise import make_noise
 from apo_bench.perception.observation.noise_file import SEPARATOR
 from apo_bench.records import ESTIMATES, TrialRecord
+from apo_bench.scenario import load_scenario
 
 SCHEMA = "apo-bench/pose-score/1"
 _RAW, _TRUE = "uncorrected", "oracle"
@@ -94,12 +95,13 @@ def score_poses(
     name += "" if estimator is None else f"{SEPARATOR}{Path(estimator).resolve()}"
     poses = make_noise(name, NoiseLevel(*deviation))
     assert isinstance(poses, PoseResults)
+    found = measure_recall(poses.folder, poses.description, poses.rows)
     compared = tuple(dict.fromkeys((_RAW, *methods, _TRUE)))
     made = run_sweep(list_grids(poses.description, compared, name, deviation), records, **how)
     return PoseScore(
         results=str(results),
         rates=_count_successes(made, compared),
-        recall=measure_recall(poses.folder, poses.description, poses.rows),
+        recall={load_scenario(source).name: each for source, each in found.items()},
     )
 
 

@@ -69,7 +69,7 @@ def measure_recall(folder: Path, description: ImageDescription, rows: PoseRows) 
     if description.secret_seed is not None:
         return {}
     models = _read_models(folder)
-    width_px = description.options["width"]
+    width_px = description.options.width
     hits: dict[str, list[Array]] = {}
     for number, scene in description.scenes.items():
         for truth, seen, model, K in _list_targets(folder, description, int(number), rows, models):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +13,19 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
+from msgspec.structs import replace
 
 from apo_bench import InputError, load_scenario
 from apo_bench.benchmark.datasets.images import make as made
-from apo_bench.benchmark.datasets.images.config import ImageConfig
 from apo_bench.benchmark.datasets.images.estimate import estimate_poses
 from apo_bench.benchmark.datasets.images.models import ImageObject, describe_model, make_model, measure_diameter
 from apo_bench.benchmark.datasets.images.scene import add_depth_noise, decode_mask, encode_mask
+from apo_bench.benchmark.datasets.images.views import draw_views
 from apo_bench.formats.bop import read_results
-from apo_bench.formats.bop_images import read_cameras, read_description
+from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_description
 from apo_bench.formats.bop_models import read_symmetries
 from apo_bench.geometry import collect_corners, pose, shrink_pieces
+from apo_bench.io import convert_typed
 from apo_bench.records import SecretSeed
 from tests.image_sets import SMALL, list_truth, make
 
@@ -158,13 +159,14 @@ def test_an_interrupted_set_is_completed_with_the_same_bytes(tmp_path: Path, mon
         nonlocal count
         count += 1
         write(*given)
-        if count == 2:
+        if count == 2:  # as if it had been interrupted in the middle of the second scene
+            (given[-1] / "scene_detections.json").unlink()
             raise KeyboardInterrupt
 
     monkeypatch.setattr(made, "write_scene", interrupt)
     with pytest.raises(KeyboardInterrupt):
         make(tmp_path / "parts", "block_on_block", range(3), config)
-    assert len([*(tmp_path / "parts" / "test").glob("0*")]) == 1
+    assert len([*(tmp_path / "parts" / "test").glob("*/scene_detections.json")]) == 1
     monkeypatch.undo()
     parts = make(tmp_path / "parts", "block_on_block", range(3), config)
     files = sorted(path.relative_to(whole) for path in whole.rglob("*") if path.is_file())
@@ -181,24 +183,24 @@ def test_other_images_are_not_mixed(images: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        ({"cameras": 3}, "--cameras must be 1, 2 or 4, got 3"),
-        ({"width": 5000}, "--width must be from 32 to 1280 pixels"),
-        ({"depth_noise_mm": -1.0}, "--depth-noise-mm must be from 0 to 5000"),
-        ({"distance_mm": 20.0}, "--distance-mm must be at least 100"),
+        ({"cameras": 3}, "images, cameras: 1 or 2 or 4 is needed, 3 was given"),
+        ({"width": 5000}, "images, width: a whole number <= 1280 is needed, 5000 was given"),
+        ({"depth_noise_mm": -1.0}, "images, depth_noise_mm: a number >= 0.0 is needed, -1.0 was given"),
+        ({"distance_mm": 20.0}, "images, distance_mm: a number >= 100.0 is needed, 20.0 was given"),
     ],
 )
 def test_impossible_cameras_are_refused(wrong: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
-        ImageConfig(**wrong)
+        convert_typed(wrong, ImageConfig, "images")
 
 
 def test_the_published_camera_differs_by_its_error() -> None:
     config = replace(SMALL, camera_error_mm=2.0, camera_error_deg=0.5, cameras=4)
-    pairs = [pair for seed in range(200) for pair in config.draw_views(np.random.default_rng(seed))]
+    pairs = [pair for seed in range(200) for pair in draw_views(config, np.random.default_rng(seed))]
     errors = np.array([pose.log(pose.inverse(p.published.T_world_view) @ p.true.T_world_view) for p in pairs])
     assert errors[:, :3].std() == pytest.approx(2e-3, rel=0.1)
     assert errors[:, 3:].std() == pytest.approx(np.radians(0.5), rel=0.1)
-    exact = replace(config, camera_error_mm=0.0, camera_error_deg=0.0).draw_views(np.random.default_rng(0))
+    exact = draw_views(replace(config, camera_error_mm=0.0, camera_error_deg=0.0), np.random.default_rng(0))
     assert all(np.allclose(p.published.T_world_view, p.true.T_world_view) for p in exact)
 
 

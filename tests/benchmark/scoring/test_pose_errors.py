@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from apo_bench.benchmark.scoring.pose_errors import (
     EvaluatedModel,
@@ -100,8 +100,6 @@ def test_pixels_count_relative_to_the_width_of_the_image(images: Path) -> None:
 
 
 def test_secret_poses_have_no_recall(images: Path) -> None:
-    import msgspec
-
-    description = msgspec.structs.replace(read_description(images), secret_seed="0" * 16)
+    description = replace(read_description(images), secret_seed="0" * 16)
     assert measure_recall(images, description, read_results(write_truth(images))) == {}
     assert list(list_truth(images))

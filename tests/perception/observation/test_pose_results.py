@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from apo_bench import Demonstration, InputError, Observation, load_scenario
 from apo_bench.formats.bop import EstimatedPose, write_results
@@ -141,8 +142,8 @@ def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array) ->
     import msgspec
 
     from apo_bench import TrialConfig
-    from apo_bench.benchmark.datasets.images.config import number_images
     from apo_bench.benchmark.datasets.images.make import describe_images, list_objects
+    from apo_bench.benchmark.datasets.images.views import draw_views, number_images
     from apo_bench.formats.bop_images import PublishedCamera
     from apo_bench.perception.observation.models.pose_results import TrialResults, read_pose_results
 
@@ -150,8 +151,9 @@ def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array) ->
     trial = TrialConfig(name, clearance_mm=scenario.clearance_mm, human_error_scale=0.0)
     description = describe_images([trial], {name: scenario}, list_objects([trial], {name: scenario}), SMALL, "test")
     (folder / "apo_trials.json").write_bytes(msgspec.json.encode(description))
-    view = SMALL.draw_views(np.random.default_rng(0))[0].published
-    camera = PublishedCamera(view.T_world_view, view.K, 0.1)
+    view = draw_views(SMALL, np.random.default_rng(0))[0].published
+    T_view = pose.inverse(view.T_world_view)
+    camera = PublishedCamera(tuple(view.K.ravel()), tuple(T_view[:3, :3].ravel()), tuple(1e3 * T_view[:3, 3]))
     rng = np.random.default_rng(4)
     now, rows = dict(start), []
     for image, operation, _ in number_images(len(scenario.assembly), 1):
@@ -182,9 +184,9 @@ def test_trials_without_images_are_refused(images: Path, shown: tuple[Demonstrat
     scene = scene_of(config)
     with pytest.raises(InputError, match="no scene is of stick_in_tower, seed 5"):
         noise_of(config, scene, demonstration_of(config, scene))
-    careless = replace(config, seed=0, human_error_scale=1.0)
+    human = dataclasses.replace(config, seed=0, human_error_scale=1.0)
     with pytest.raises(InputError, match="human error scale 1 was given, and the images in"):
-        noise_of(careless, scene, demonstration_of(careless, scene))
+        noise_of(human, scene, demonstration_of(human, scene))
 
 
 def test_files_that_do_not_belong_together_are_refused(images: Path, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ depth camera of this package: point-to-plane ICP from the 24 orientations of a b
 depth image is kept.
 """
 
-import json
 import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -19,12 +18,14 @@ from apo_bench.errors import require
 from apo_bench.formats.bop import EstimatedPose, write_results
 from apo_bench.formats.bop_images import PublishedCamera, SceneEntry, read_cameras, read_description
 from apo_bench.geometry import Array, find_symmetries, pose, shrink_pieces
-from apo_bench.io import group_by
+from apo_bench.io import group_by, read_plain
 from apo_bench.perception.depth_camera.model_localisation import Appearance, Model, locate_model
 from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
 from apo_bench.perception.depth_camera.surface import load_small_gicp, sample_surface
 from apo_bench.scenario import load_scenario
 from apo_bench.simulation.sensor.rays import ModelRays
+
+_LARGEST_BYTES = 1_000_000_000
 
 
 class _SceneModels(NamedTuple):
@@ -50,7 +51,7 @@ def estimate_poses(images: Path, out: Path) -> int:
     """
     load_small_gicp()
     description = read_description(images)
-    detections = json.loads((images / JOINED_DETECTIONS).read_text(encoding="utf-8"))
+    detections = read_plain(images / JOINED_DETECTIONS, "detections", syntax="json", limit=_LARGEST_BYTES)
     require(detections, f"{images / JOINED_DETECTIONS}: there is no detection; make images of more trials.")
     models: dict[tuple[str, float], _SceneModels] = {}
     found: list[EstimatedPose] = []
@@ -64,7 +65,7 @@ def estimate_poses(images: Path, out: Path) -> int:
         for image, those in group_by((each["image_id"], each) for each in ours).items():
             start = time.perf_counter()
             distance, view = read_distances(folder / "depth" / f"{image:06d}.png", cameras[image])
-            noise_m = 1e-3 * description.options["depth_noise_mm"] * float(np.nanmedian(distance)) ** 2
+            noise_m = 1e-3 * description.options.depth_noise_mm * float(np.nanmedian(distance)) ** 2
             located = list(_locate(those, distance, view, models[key], noise_m))
             spent = time.perf_counter() - start
             for number, T, score in located:

@@ -1,7 +1,6 @@
 """Make a data set of images in BOP format from trials: one scene a trial, one image after each operation and camera."""
 
 import json
-import shutil
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -12,16 +11,17 @@ import msgspec
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.benchmark.datasets.images.config import ImageConfig, number_images
 from apo_bench.benchmark.datasets.images.models import ImageObject, write_models
 from apo_bench.benchmark.datasets.images.scene import DEPTH_SCALE, DETECTIONS, write_scene
+from apo_bench.benchmark.datasets.images.views import make_view, number_images
 from apo_bench.benchmark.sweeps.pool import make_process_pool
 from apo_bench.errors import require
-from apo_bench.formats.bop_images import DESCRIPTION, ImageDescription, ImageEntry, SceneEntry
+from apo_bench.formats.bop_images import DESCRIPTION, ImageConfig, ImageDescription, ImageEntry, SceneEntry
 from apo_bench.io import group_by, write_file
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.scenario.parts import read_part
+from apo_bench.simulation.scene.composing import movable_parts
 from apo_bench.simulation.sensor.photographs import Photographer
 from apo_bench.trial.trial_stages import IMAGES, demonstration_of, scene_of, stream
 
@@ -76,15 +76,10 @@ def make_images(
     write_models({number: each for each, number in objects.items()}, out)
     write_file(out / "camera.json", json.dumps(_describe_camera(config), indent=1))
     write_file(out / "README.md", _CARD.format(version=__version__, command=command))
-    left = [
-        (number, trial) for number, trial in enumerate(trials, start=1) if not (out / split / f"{number:06d}").is_dir()
-    ]
-    batches = [
-        several[first : first + _BATCH]
-        for several in group_by((trial.scenario, (number, trial)) for number, trial in left).values()
-        for first in range(0, len(several), _BATCH)
-    ]
-    for sentence in _run(batches, description, config, out / split, workers):
+    done = {int(path.parent.name) for path in (out / split).glob(f"*/{DETECTIONS}")}
+    left = [(trial.scenario, (number, trial)) for number, trial in enumerate(trials, start=1) if number not in done]
+    batches = [several[k : k + _BATCH] for several in group_by(left).values() for k in range(0, len(several), _BATCH)]
+    for sentence in _run(batches, description, out / split, workers):
         say(sentence)
     return _join_scenes(out, split)
 
@@ -93,7 +88,7 @@ def list_objects(trials: Sequence[TrialConfig], loaded: dict[str, Scenario]) -> 
     """The objects of all trials with their numbers, from 1; parts of one file, clearance and colour are one object."""
     objects: dict[ImageObject, int] = {}
     for trial in trials:
-        for part in _list_movable(loaded[trial.scenario]):
+        for part in movable_parts(loaded[trial.scenario]):
             objects.setdefault(_find_object(loaded[trial.scenario], part, trial.clearance_mm), len(objects) + 1)
     return objects
 
@@ -116,7 +111,7 @@ def describe_images(
     scenes = {}
     for number, trial in enumerate(trials, start=1):
         scenario = loaded[trial.scenario]
-        parts = {part: objects[_find_object(scenario, part, trial.clearance_mm)] for part in _list_movable(scenario)}
+        parts = {part: objects[_find_object(scenario, part, trial.clearance_mm)] for part in movable_parts(scenario)}
         images = {
             str(image): ImageEntry(operation, camera)
             for image, operation, camera in number_images(len(scenario.assembly), config.cameras)
@@ -127,14 +122,10 @@ def describe_images(
         split=split,
         human_error_scale=human_error_scale,
         secret_seed=None if secret_seed is None else secret_seed.hash,
-        options=config.plain(),
+        options=config,
         centers_mm={str(number): tuple((1e3 * each.offset[:3, 3]).tolist()) for each, number in objects.items()},
         scenes=scenes,
     )
-
-
-def _list_movable(scenario: Scenario) -> list[str]:
-    return [part for part in scenario.assembly.solids if part not in scenario.assembly.fixed]
 
 
 def _find_object(scenario: Scenario, part: str, clearance_mm: float) -> ImageObject:
@@ -164,37 +155,33 @@ def _open_folder(out: Path, description: ImageDescription) -> None:
 
 def _describe_camera(config: ImageConfig) -> dict[str, Any]:
     """The content of `camera.json`."""
-    K = config.view(np.eye(4)).K
+    K = make_view(config, np.eye(4)).K
     size = {"width": config.width, "height": config.height, "depth_scale": DEPTH_SCALE}
     return {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2], **size}
 
 
-def _run(
-    batches: Sequence[Batch], description: ImageDescription, config: ImageConfig, folder: Path, workers: int
-) -> list[str]:
+def _run(batches: Sequence[Batch], description: ImageDescription, folder: Path, workers: int) -> list[str]:
     """Write all batches, in processes if there are several workers; returns sentences about failed demonstrations."""
     if workers == 1 or not batches:
-        return [sentence for batch in batches for sentence in write_batch(batch, description, config, folder)]
+        return [sentence for batch in batches for sentence in write_batch(batch, description, folder)]
     with make_process_pool(min(workers, len(batches))) as pool:
-        running = [pool.schedule(write_batch, [batch, description, config, folder]) for batch in batches]
+        running = [pool.schedule(write_batch, [batch, description, folder]) for batch in batches]
         return [sentence for future in running for sentence in future.result()]
 
 
-def write_batch(batch: Batch, description: ImageDescription, config: ImageConfig, folder: Path) -> list[str]:
-    """Write scenes of one scenario, each completely or not at all; returns sentences about failed demonstrations."""
+def write_batch(batch: Batch, description: ImageDescription, folder: Path) -> list[str]:
+    """Write scenes of one scenario; returns sentences about failed demonstrations."""
     scene = scene_of(batch[0][1])
+    config = description.options
     failed = []
-    with closing(Photographer(scene, config.view(np.eye(4)), not config.no_rgb)) as photographer:
+    with closing(Photographer(scene, make_view(config, np.eye(4)), not config.no_rgb)) as photographer:
         for number, trial in batch:
             shown = demonstration_of(trial, scene).demonstration
             if shown.code != "ok":
                 failed.append(f"{trial.scenario}, seed {trial.seed}: the demonstration failed, so it has no images.")
                 continue
             rng = stream(trial.seed, IMAGES, trial.secret_seed)
-            part = folder / f".{number:06d}.part"
-            shutil.rmtree(part, ignore_errors=True)
-            write_scene(photographer, shown, number, description, config, rng, part)
-            part.rename(folder / f"{number:06d}")
+            write_scene(photographer, shown, number, description, rng, folder / f"{number:06d}")
     return failed
 
 

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Demonstration, Poses
-from apo_bench.benchmark.datasets.images.config import ImageConfig, ViewPair, number_images
-from apo_bench.formats.bop_images import CAMERAS, ImageDescription, SceneEntry
+from apo_bench.benchmark.datasets.images.views import ViewPair, draw_views, number_images
+from apo_bench.formats.bop_images import CAMERAS, ImageConfig, ImageDescription, SceneEntry
 from apo_bench.geometry import Array, pose
+from apo_bench.io import write_file
 from apo_bench.perception.depth_camera.range_finder import BIAS
 from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photographer, Silhouette, find_box
 
 DETECTIONS = "scene_detections.json"
-"""The detections of one scene; those of all scenes are joined in the folder of the data set."""
+"""The detections of one scene, written last, so that a scene with this file is complete."""
 DEPTH_SCALE = 0.1
 """[mm] of one step in a depth image."""
 _FARTHEST_MM = 6500.0  # depth that 16 bits hold
@@ -49,7 +50,6 @@ def write_scene(
     demonstration: Demonstration,
     number: int,
     description: ImageDescription,
-    config: ImageConfig,
     rng: np.random.Generator,
     out: Path,
 ) -> None:
@@ -61,11 +61,12 @@ def write_scene(
         out: Folder of the scene, made here.
     """
     scene = description.scenes[str(number)]
+    config = description.options
     is_secret = description.secret_seed is not None
     for folder in ("depth", *["rgb"] * (not config.no_rgb), *["mask", "mask_visib"] * (not is_secret)):
-        (out / folder).mkdir(parents=True)
+        (out / folder).mkdir(parents=True, exist_ok=True)
     moments = list(list_moments(demonstration))
-    views = config.draw_views(rng)
+    views = draw_views(config, rng)
     if config.randomise:
         photographer.vary(rng)
     files = SceneFiles({}, {}, {}, [])
@@ -75,15 +76,15 @@ def write_scene(
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
         _describe_image(photograph, depth, views[camera], poses, (number, image), description, files)
-    written = {CAMERAS: files.camera, DETECTIONS: files.detections}
+    written: dict[str, Any] = {CAMERAS: files.camera}
     if not is_secret:
         written |= {
             "scene_gt.json": files.gt,
             "scene_gt_info.json": files.gt_info,
             "scene_gt_coco.json": make_coco(scene, config, files),
         }
-    for name, content in written.items():
-        (out / name).write_text(json.dumps(content), encoding="utf-8")
+    for name, content in (*written.items(), (DETECTIONS, files.detections)):
+        write_file(out / name, json.dumps(content))
 
 
 def add_depth_noise(depth: Array, noise_mm: float, rng: np.random.Generator) -> Array:
@@ -116,7 +117,7 @@ def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path,
 def _write_png(path: Path, pixels: NDArray[Any]) -> None:
     import imageio.v3 as imageio
 
-    imageio.imwrite(path, pixels, compress_level=1)
+    write_file(path, imageio.imwrite("<bytes>", pixels, extension=".png", compress_level=1))
 
 
 def _describe_image(

@@ -45,7 +45,7 @@ class TrialKey(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class PoseResults:
-    """The results of a pose estimator in a data set of images."""
+    """The results of a pose estimator in a data set of images, before the trial is known."""
 
     file: str
     folder: Path
@@ -57,8 +57,11 @@ class PoseResults:
     fitted: MeasuredNoise | None = None
     """Distribution of the errors in the frames of camera rays, stated in place of the noise level."""
 
-    def find_scene(self, key: TrialKey) -> str:
-        """The number of the scene of a trial.
+    def of_trial(self, key: TrialKey, turns: Array) -> "TrialResults":
+        """The poses of one trial, as a noise model.
+
+        Args:
+            turns: (n, 3, 3), the planned rotation of each target pose, world.
 
         Raises:
             InputError: The data set has no images of this trial.
@@ -66,33 +69,15 @@ class PoseResults:
         drawn = self.description.secret_seed
         for number, scene in self.description.scenes.items():
             if (scene.scenario, scene.seed, scene.clearance_mm, drawn) == key:
-                return number
+                folder = self.folder / self.description.split / f"{int(number):06d}"
+                cameras = read_cameras(folder) if folder.is_dir() else {}  # a failed demonstration has no images
+                return TrialResults(self, int(number), scene, cameras, turns)
         seeds = sorted(scene.seed for scene in self.description.scenes.values() if scene.scenario == key.scenario)
         shown = f"seeds {seeds[0]} to {seeds[-1]}" if seeds else "none"
         raise InputError(
             f"{self.folder / DESCRIPTION}: no scene is of {key.scenario}, seed {key.seed}, clearance "
             f"{key.clearance_mm:g} mm and the same secret seed; of this scenario it has {shown}."
         )
-
-    def check_human_error(self, scale: float) -> None:
-        """Raise an `InputError` unless the images show demonstrations with this human error scale."""
-        shown = self.description.human_error_scale
-        require(
-            scale == shown,
-            f"the human error scale {scale:g} was given, and the images in '{self.folder}' show demonstrations with "
-            f"{shown:g}; give that one.",
-        )
-
-    def of_trial(self, key: TrialKey, turns: Array) -> "TrialResults":
-        """The poses of one trial, as a noise model.
-
-        Args:
-            turns: (n, 3, 3), the planned rotation of each target pose, world.
-        """
-        number = self.find_scene(key)
-        folder = self.folder / self.description.split / f"{int(number):06d}"
-        cameras = read_cameras(folder) if folder.is_dir() else {}  # a failed demonstration has no images
-        return TrialResults(self, int(number), self.description.scenes[number], cameras, turns)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         raise InputError(f"the poses in '{self.file}' are those of trials; observe a trial that has images.")
