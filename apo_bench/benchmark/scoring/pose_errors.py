@@ -91,8 +91,7 @@ def _read_models(folder: Path) -> dict[int, EvaluatedModel]:
     for name, entry in read_plain(place / MODELS_INFO, "sizes of models", syntax="json").items():
         number = int(name)
         mesh: Any = trimesh.load(place / f"obj_{number:06d}.ply", process=False)
-        vertices: Array = np.unique(np.round(mesh.vertices, 6), axis=0)
-        models[number] = EvaluatedModel(vertices, entry["diameter"], known.get(number, _NOTHING).images)
+        models[number] = EvaluatedModel(np.array(mesh.vertices), entry["diameter"], known.get(number, _NOTHING).images)
     return models
 
 

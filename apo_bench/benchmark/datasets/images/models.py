@@ -90,6 +90,7 @@ def write_models(objects: Mapping[int, ImageObject], out: Path) -> None:
         mesh = make_model(each)
         described[str(number)] = describe_model(each, mesh.vertices)
         fine = mesh.subdivide_to_size(_FINEST * described[str(number)]["diameter"])
+        fine.merge_vertices(merge_norm=True)  # so that each counts once in a mean
         for folder, form in zip(_FOLDERS, (mesh, fine), strict=True):
             content = form.export(file_type="ply", vertex_normal=True)
             write_file(out / folder / f"obj_{number:06d}.ply", content)
