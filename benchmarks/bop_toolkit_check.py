@@ -90,7 +90,8 @@ def measure_recall(images: Path, results: Path) -> None:
         for name, limits in THRESHOLDS.items():
             errors = [[measure(name, g, e, models[number], symmetries[number], K) for e in best] for g in truth]
             hits[name] += np.mean([count_matches(np.array(errors) / units[name], limit) for limit in limits])
-    print(results, {name: round(float(100.0 * count / total), 3) for name, count in hits.items()}, f"of {total} targets")
+    percent = {name: round(float(100.0 * count / total), 3) for name, count in hits.items()}
+    print(results, percent, f"of {total} targets")
 
 
 def measure(name: str, truth: Any, estimate: Any, points: Any, symmetries: Any, K: Any) -> float:
