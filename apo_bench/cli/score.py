@@ -57,7 +57,10 @@ def score_command(
         make_path_option("Form of `part export`, filled in: trials of a real robot; nothing is simulated."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Run a few trials of each condition, as a test.")] = False,
+    trials: Annotated[
+        int | None, typer.Option(min=1, help="The first so many trials of each condition; default: all of the track.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="One trial of each condition, as a test.")] = False,
     secret_seed_file: Annotated[
         Path | None, make_path_option("Draw trials that nobody can draw without this file.")
     ] = None,
@@ -81,11 +84,12 @@ def score_command(
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
 
     require((method is None) != (command is None), "name either METHOD or --command.")
+    require(trials is None or not quick, "give either --trials or --quick.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
     how: dict[str, Any] = {
-        "quick": quick,
+        "trials": 1 if quick else trials,
         "workers": count_cores() if workers is None and backend == "local" else workers,
         "backend": backend,
         "address": address,
@@ -125,7 +129,7 @@ def score_command(
 
 
 def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
-    from apo_bench.benchmark.scoring.entry import form_of
+    from apo_bench.benchmark.scoring.entry import LEAST_TRIALS, form_of
     from apo_bench.viz.form_text import make_table
 
     if as_json:
@@ -133,6 +137,6 @@ def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
         return
     print_table(make_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
     if entry.overall is not None:
-        few = "; too few trials for a score (--quick)" if entry.quick else ""
+        few = f"; too few trials for a score, which needs {LEAST_TRIALS} per condition" if entry.has_few_trials else ""
         typer.echo("all {:.1f} ({:.1f} to {:.1f})".format(*entry.overall) + few)
     typer.echo(f"Entry: {out}")
