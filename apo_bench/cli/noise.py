@@ -82,7 +82,9 @@ def noise_fit(
     out: Annotated[Path | None, make_path_option("Write the noise file for --noise: .toml.")] = None,
     residuals: Annotated[Path | None, make_path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
     picture: Annotated[Path | None, make_path_option("Draw observed and fitted distributions: .png.")] = None,
-    source: Annotated[str | None, typer.Option(help="Source to name in the noise file; default: the files.")] = None,
+    source_name: Annotated[
+        str | None, typer.Option(help="Source to name in the noise file; default: the files.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Fit a noise model to a pose estimator: tails across and along the ray, outliers and misses.
@@ -109,7 +111,7 @@ def noise_fit(
     known = models or find_models_info(truth)
     symmetries = None if known is None else read_symmetries(known)
     matched = match_residuals(results, read_truth(truth, results, scene_id), symmetries)
-    fitted = fit_noise(matched, _clean_line(source or f"{estimates.name} against {truth.name}"))
+    fitted = fit_noise(matched, _clean_line(source_name or f"{estimates.name} against {truth.name}"))
     form = make_fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:
         command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"

@@ -80,7 +80,10 @@ def score_command(
         make_path_option("Form of `part export`, filled in: trials of a real robot; nothing is simulated."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Run a few trials of each condition, as a test.")] = False,
+    trials: Annotated[
+        int | None, typer.Option(min=1, help="The first so many trials of each condition; default: all of the track.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="One trial of each condition, as a test.")] = False,
     secret_seed_file: Annotated[
         Path | None, make_path_option("Draw trials that nobody can draw without this file.")
     ] = None,
@@ -104,6 +107,7 @@ def score_command(
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
 
     require((method is None) != (command is None), "name either METHOD or --command.")
+    require(trials is None or not quick, "give either --trials or --quick.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None and poses is None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
@@ -114,8 +118,8 @@ def score_command(
         "secret_seed_file": secret_seed_file,
     }
     if poses is not None:
-        given = {"--track": track, "--command": command, "--results": results, "--name": name, "--quick": quick}
-        named = next((option for option, value in given.items() if value), None)
+        given = {"--track": track, "--command": command, "--results": results, "--name": name, "--trials": trials}
+        named = next((option for option, value in (given | {"--quick": quick}).items() if value), None)
         require(named is None, f"{named} and --poses exclude each other; leave one of them out.")
     else:
         require((deviation_mm, deviation_deg) == (None, None), "--deviation-mm and --deviation-deg need --poses.")
@@ -148,7 +152,7 @@ def score_command(
                 tracks,
                 records,
                 name=name,
-                quick=quick,
+                trials=1 if quick else trials,
                 command=line,
                 said=lambda each: print_text(f"{each.name}: {each.title}", as_json),
                 **how,
@@ -174,7 +178,7 @@ def _score_poses(method: str, poses: Path, out: Path, as_json: bool, **how: Any)
 
 
 def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
-    from apo_bench.benchmark.scoring.entry import form_of
+    from apo_bench.benchmark.scoring.entry import LEAST_TRIALS, form_of
     from apo_bench.viz.form_text import make_table
 
     if as_json:
@@ -182,6 +186,6 @@ def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
         return
     print_table(make_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
     if entry.overall is not None:
-        few = "; too few trials for a score (--quick)" if entry.quick else ""
+        few = f"; too few trials for a score, which needs {LEAST_TRIALS} per condition" if entry.has_few_trials else ""
         typer.echo("all {:.1f} ({:.1f} to {:.1f})".format(*entry.overall) + few)
     typer.echo(f"Entry: {out}")

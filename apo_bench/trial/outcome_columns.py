@@ -139,8 +139,8 @@ def _fill_probing_columns(found: ProbingResult | None) -> TrialRecord:
         "probe_contacts_rejected": found.refused,
         "base_error_estimate_mm": found.mm,
         "base_error_estimate_deg": found.deg,
-        "base_error_std_mm": found.sure_mm,
-        "base_error_std_deg": found.sure_deg,
+        "base_error_estimate_std_mm": found.sure_mm,
+        "base_error_estimate_std_deg": found.sure_deg,
     }
 
 
