@@ -18,6 +18,7 @@ from apo_bench.simulation.sensor.rays import ModelRays
 
 _MARGIN_PX = 2
 """Pixels around the projected corners of a part in which its silhouette is looked for."""
+_SHADOW_TEXELS = 2048  # along a side of the shadow map; each covers 0.8 mm on the table, a pixel at 0.9 m 1.1 mm
 _LIGHT_SPREAD = np.array([0.5, 0.5, 0.0])
 """Varied lights: largest change of their direction, relative to its vertical component."""
 _BRIGHTNESS = 0.6, 1.3
@@ -75,7 +76,7 @@ class Photographer:
         self._cast = ModelRays(scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm)
         self._world = replace(scene.shown, model=copy.copy(scene.shown.model))  # whose lights and colours may change
         self._world.model.vis.global_.fovy = view.fov_deg  # of free cameras
-        self._renderer = renderer(self._world.model, view.width, view.height) if colours else None
+        self._renderer = renderer(self._world.model, view.width, view.height, _SHADOW_TEXELS) if colours else None
 
     def vary(self, rng: np.random.Generator) -> None:
         """Draw other directions and brightnesses of the lights, and another colour of the fixed parts."""

@@ -1,6 +1,7 @@
 """Take and write the images of one trial: a scene of a data set in BOP format."""
 
 import json
+import zlib
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
@@ -117,7 +118,8 @@ def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path,
 def _write_png(path: Path, pixels: NDArray[Any]) -> None:
     import imageio.v3 as imageio
 
-    write_file(path, imageio.imwrite("<bytes>", pixels, extension=".png", compress_level=1))
+    how = {"compress_level": 1, "compress_type": zlib.Z_RLE}  # fast, and small for masks and flat colours
+    write_file(path, imageio.imwrite("<bytes>", pixels, extension=".png", **how))
 
 
 def _describe_image(
