@@ -11,6 +11,7 @@ from apo_bench.simulation.scene.render import (
     draw_picture,
     move_arm_home,
     place_for_picture,
+    release_renderer,
     save_film,
 )
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -57,6 +58,7 @@ __all__ = (
     "move_part",
     "place_for_picture",
     "project_to_pixels",
+    "release_renderer",
     "save_film",
     "set_part_pose",
     "switch_wrist_sensors_on",

@@ -156,7 +156,7 @@ class Film:
         _check_camera(scene.work, self.camera)
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        self._close = weakref.finalize(self, _release, self._renderer)
+        self._close = weakref.finalize(self, release_renderer, self._renderer)
         self._every = speed / fps
         self._next = 0.0
 
@@ -283,7 +283,7 @@ def build_data(world: World, scene: Scene, poses: Poses) -> Any:
     return data
 
 
-def _release(renderer: Any) -> None:
+def release_renderer(renderer: Any) -> None:
     """Close a renderer in its own OpenGL context; in another one it would free that one's resources."""
     context = renderer._gl_context
     if context is not None:

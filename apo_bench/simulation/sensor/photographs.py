@@ -13,7 +13,7 @@ from apo_bench.assembly import Poses
 from apo_bench.geometry import Array, Ints, collect_corners, pose
 from apo_bench.perception.depth_camera.range_finder import PinholeView
 from apo_bench.simulation.graphics import renderer
-from apo_bench.simulation.scene import Scene, aim_camera, build_data
+from apo_bench.simulation.scene import Scene, aim_camera, build_data, release_renderer
 from apo_bench.simulation.sensor.rays import ModelRays
 
 _MARGIN_PX = 2
@@ -106,7 +106,7 @@ class Photographer:
     def close(self) -> None:
         """Free the renderer, before another one is made."""
         if self._renderer is not None:
-            self._renderer.close()
+            release_renderer(self._renderer)
             self._renderer = None
 
     def _render(self, view: PinholeView, poses: Poses) -> NDArray[np.uint8] | None:

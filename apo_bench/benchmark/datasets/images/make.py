@@ -15,6 +15,7 @@ from apo_bench.benchmark.datasets.images.models import ImageObject, write_models
 from apo_bench.benchmark.datasets.images.scene import DEPTH_SCALE, DETECTIONS, write_scene
 from apo_bench.benchmark.datasets.images.views import make_view, number_images
 from apo_bench.benchmark.sweeps.pool import make_process_pool
+from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
 from apo_bench.errors import require
 from apo_bench.formats.bop_images import DESCRIPTION, ImageConfig, ImageDescription, ImageEntry, SceneEntry
 from apo_bench.io import group_by, write_file
@@ -164,7 +165,7 @@ def _run(batches: Sequence[Batch], description: ImageDescription, folder: Path, 
     """Write all batches, in processes if there are several workers; returns sentences about failed demonstrations."""
     if workers == 1 or not batches:
         return [sentence for batch in batches for sentence in write_batch(batch, description, folder)]
-    with make_process_pool(min(workers, len(batches))) as pool:
+    with stop_at_signals(), make_process_pool(min(workers, len(batches))) as pool:
         running = [pool.schedule(write_batch, [batch, description, folder]) for batch in batches]
         return [sentence for future in running for sentence in future.result()]
 
