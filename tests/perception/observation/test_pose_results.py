@@ -137,8 +137,12 @@ def test_parts_that_are_alike_are_told_apart_by_their_places(tmp_path: Path) -> 
     assert chosen["seen"].observed.all()
 
 
-def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array) -> dict[str, Any]:
-    """Observe shuffled estimates with errors of 2 mm, without images: from a description and cameras alone."""
+def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array, twice: str = "") -> dict[str, Any]:
+    """Observe shuffled estimates with errors of 2 mm, without images: from a description and cameras alone.
+
+    Args:
+        twice: A part that has another estimate of the best score, while `disc3` has none.
+    """
     import msgspec
 
     from apo_bench import TrialConfig
@@ -160,12 +164,14 @@ def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array) ->
         done = scenario.assembly.operations[operation - 1]
         step = poses[operation - 1] @ pose.inverse(now[done.main])
         now |= {part: step @ now[part] for part in done.moves}
-        for part in rng.permutation([*description.scenes["1"].parts]):
+        for part in rng.permutation([each for each in description.scenes["1"].parts if not twice or each != "disc3"]):
             number = description.scenes["1"].parts[part]
             T = now[part].copy()
             T[:3, 3] += 2e-3 * rng.uniform(-1.0, 1.0, 3)
             T_camera = pose.inverse(camera.T_world_camera) @ T @ description.offset(number)
             rows.append(EstimatedPose((1, image, number), float(rng.random()), T_camera, -1.0))
+            if part == twice:
+                rows.append(EstimatedPose((1, image, number), 2.0, pose.at((0.0, 0.0, 0.001)) @ T_camera, -1.0))
     write_results(folder / "results.csv", rows)
     results = read_pose_results(folder / "results.csv", NoiseLevel(1.0, 1.0))
     n = len(scenario.assembly)
@@ -174,6 +180,16 @@ def follow(folder: Path, name: str, start: Mapping[str, Array], poses: Array) ->
     noise = TrialResults(results, 1, scene, cameras, scenario.nominal_poses[:, :3, :3])
     demonstration = Demonstration(scenario.assembly, start, poses, now, np.zeros((n, 6, 6)))
     return {"seen": noise(scenario.assembly, demonstration, rng), "truth": poses}
+
+
+def test_a_second_estimate_of_a_part_that_stays_is_not_taken_for_the_moved_one(tmp_path: Path) -> None:
+    """Each disc that lies already has two estimates, of better scores than that of the disc that was moved."""
+    name = "gearbox"
+    scenario = load_scenario(name)
+    layout = place_layout(scenario, *scenario.site.center_m, 0.0, clearance_mm=scenario.clearance_mm)
+    chosen = follow(tmp_path, name, layout.start, layout.poses, twice="disc1")
+    k = [operation.main for operation in scenario.assembly.operations].index("disc2")
+    assert np.linalg.norm(chosen["seen"].poses[k, :3, 3] - layout.poses[k, :3, 3]) < 5e-3
 
 
 def test_trials_without_images_are_refused(images: Path, shown: tuple[Demonstration, Array]) -> None:

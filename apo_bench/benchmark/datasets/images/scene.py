@@ -118,7 +118,10 @@ def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path,
 def _write_png(path: Path, pixels: NDArray[Any]) -> None:
     import imageio.v3 as imageio
 
-    how: dict[str, Any] = {"compress_level": 1, "compress_type": zlib.Z_RLE}  # fast, and small for masks and flat colours
+    how: dict[str, Any] = {
+        "compress_level": 1,
+        "compress_type": zlib.Z_RLE,
+    }  # fast, and small for masks and flat colours
     write_file(path, imageio.imwrite("<bytes>", pixels, extension=".png", **how))
 
 

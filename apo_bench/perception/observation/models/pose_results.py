@@ -31,6 +31,8 @@ from apo_bench.perception.observation.models.facts import NoiseLevel
 from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, MeasuredNoise, restate_covariance
 from apo_bench.perception.observation.models.outliers import UNOBSERVED_DEVIATION, find_last_observed_poses
 
+_TIE = 1e-6  # cost of a worse score, relative to the smallest extent of a part
+
 
 class TrialKey(NamedTuple):
     """What a trial shares with a scene of a data set of images."""
@@ -150,14 +152,17 @@ class TrialResults:
         number = self.scene.parts[operation.main]
         alike = [part for part, each in self.scene.parts.items() if each == number and part not in operation.moves]
         candidates = self._list_estimates(image, number)[: len(alike) + 1]
+        if not candidates:
+            return None
         solid = assembly.solids[operation.main]
-        centers = np.array([each.T[:3, :3] @ solid.centroid + each.T[:3, 3] for each in candidates]).reshape(-1, 3)
-        expected = np.array([pose.apply(estimated[part], solid.centroid[None])[0] for part in alike]).reshape(-1, 3)
+        centers = pose.apply_all(np.array([each.T for each in candidates]), solid.centroid[None])
         reach = min(np.ptp(measure_extent(solid.pieces, axis)) for axis in np.eye(3))
-        costs = np.linalg.norm(expected[:, None] - centers[None], axis=2)
-        # the main part may be anywhere; an estimate nearer than `reach` to a part that stays is of that part
-        costs = np.concatenate([costs, np.full((1, len(candidates)), reach)])
-        which, chosen = linear_sum_assignment(costs)
+        expected = np.array([pose.apply(estimated[part], solid.centroid[None])[0] for part in alike]).reshape(-1, 3)
+        distances = np.linalg.norm(expected[:, None] - centers[:, 0], axis=2)
+        # The main part may be anywhere, but not where an equal part stays; ties go to the better score.
+        nearest = distances.min(axis=0, initial=np.inf)
+        of_main = reach + np.clip(reach - nearest, 0.0, reach) + _TIE * reach * np.arange(len(candidates))
+        which, chosen = linear_sum_assignment(np.concatenate([np.minimum(distances, 2.0 * reach), of_main[None]]))
         left = chosen[which == len(alike)]
         return candidates[left[0]] if len(left) else None
 
