@@ -155,7 +155,7 @@ def main() -> None:
         others = find_residuals(make_split(folder, "val", given.trials, scale))
         fitted.write_text(format_noise_file(fit_noise(others, "icp")), encoding="utf-8")
         results = make_split(folder, "test", given.trials, scale)
-        rows[scale] = score_poses(METHODS, results, folder / "records", estimator=fitted).list_rows()
+        rows[scale] = score_poses(METHODS, results, folder / "records", estimator=fitted)
         residuals[scale] = find_residuals(results)
         print(json.dumps(rows[scale]), flush=True)
     write_page(rows, residuals, given.trials)

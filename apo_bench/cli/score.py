@@ -167,12 +167,12 @@ def _score_poses(method: str, poses: Path, out: Path, as_json: bool, **how: Any)
     from apo_bench.io import write_file
     from apo_bench.viz.form_text import make_table
 
-    scored = score_poses((method,), poses, out.with_suffix(""), **how)
-    write_file(out, json.dumps(scored.form(), indent=1))
+    form = {"results": str(poses), "rows": score_poses((method,), poses, out.with_suffix(""), **how)}
+    write_file(out, json.dumps(form, indent=1))
     if as_json:
-        print_json(scored.form())
+        print_json(form)
         return
-    print_table(make_table(scored.list_rows(), _POSE_COLUMNS))
+    print_table(make_table(form["rows"], _POSE_COLUMNS))
     typer.echo("Success and recall in percent; low and high are the ends of Wilson's 95 % interval.")
     typer.echo(f"Score: {out}")
 

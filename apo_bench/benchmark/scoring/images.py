@@ -1,9 +1,8 @@
 """Score the poses of a pose estimator in images of trials: as they are, corrected, and next to the true poses."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.analysis.rates import Rate
@@ -15,55 +14,13 @@ from apo_bench.io import group_by
 from apo_bench.perception.observation.models import NoiseLevel, PoseResults
 from apo_bench.perception.observation.noise import make_noise
 from apo_bench.perception.observation.noise_file import SEPARATOR
-from apo_bench.records import ESTIMATES, TrialRecord
+from apo_bench.records import ESTIMATES
 from apo_bench.scenario import load_scenario
 
-SCHEMA = "apo-bench/pose-score/1"
 _RAW, _TRUE = "uncorrected", "oracle"
 _FIDELITY = "near-contact"  # as in the tracks
-_ALL = "all"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class PoseScore:
-    """Success of a robot with the poses of a pose estimator, and their recall."""
-
-    results: str
-    """File of the results."""
-    rates: Mapping[str, Mapping[str, Rate]]
-    """Scenario, or `all` -> `uncorrected`, the methods, and `oracle` -> successes among trials."""
-    recall: Mapping[str, PoseRecall]
-    """Scenario -> recall of the poses; empty if the true poses are secret."""
-
-    def list_rows(self) -> list[dict[str, Any]]:
-        """One row for each scenario and method, in percent; a recall is repeated for each method."""
-        return [
-            {
-                "scenario": scenario,
-                "method": method,
-                "trials": rate.trials,
-                "success": 100.0 * (rate.rate or 0.0),
-                "low": 100.0 * rate.interval.low,
-                "high": 100.0 * rate.interval.high,
-                **self._list_recall(scenario),
-            }
-            for scenario, rates in self.rates.items()
-            for method, rate in rates.items()
-        ]
-
-    def _list_recall(self, scenario: str) -> dict[str, float | None]:
-        """Recall in percent; of `all` the mean over all targets."""
-        those = [found for name, found in self.recall.items() if scenario in (name, _ALL)]
-        targets = sum(found.targets for found in those)
-        return {
-            name: 100.0 * sum(getattr(found, name) * found.targets for found in those) / targets if targets else None
-            for name in ("mssd", "mspd", "add")
-        }
-
-    def form(self) -> dict[str, Any]:
-        """The score as JSON."""
-        return {"schema": SCHEMA, "results": self.results, "rows": self.list_rows()}
+ALL = "all"
+"""Name of the row of all scenarios."""
 
 
 @check_arguments
@@ -75,10 +32,11 @@ def score_poses(
     deviation: tuple[float, float] = (1.0, 1.0),
     estimator: str | Path | None = None,
     **how: Any,
-) -> PoseScore:
+) -> list[dict[str, Any]]:
     """Replay the trials of a data set of images with the poses of a pose estimator.
 
-    Every trial runs uncorrected, with each method, and with the true poses.
+    Every trial runs uncorrected, with each method, and with the true poses. Trials whose demonstration failed do not
+    count.
 
     Args:
         methods: As for `run_sweep`.
@@ -88,6 +46,11 @@ def score_poses(
         estimator: A noise file of `noise fit` whose errors are stated instead.
         how: As for `run_sweep`: `workers`, `backend`, `secret_seed_file`.
 
+    Returns:
+        For each scenario, and for all if there are several, and each method: `scenario`, `method`, `trials`,
+        `successes`, the rate `success` with its interval `low` to `high`, and recall of the poses, `mssd`, `mspd` and
+        `add`, in percent; a recall is None if the true poses are secret.
+
     Raises:
         InputError: A file is missing, deviates from its format, or is of other images.
     """
@@ -96,13 +59,31 @@ def score_poses(
     poses = make_noise(name, NoiseLevel(*deviation))
     assert isinstance(poses, PoseResults)
     found = measure_recall(poses.folder, poses.description, poses.rows)
+    recall = {load_scenario(source).name: each for source, each in found.items()}
     compared = tuple(dict.fromkeys((_RAW, *methods, _TRUE)))
     made = run_sweep(list_grids(poses.description, compared, name, deviation), records, **how)
-    return PoseScore(
-        results=str(results),
-        rates=_count_successes(made, compared),
-        recall={load_scenario(source).name: each for source, each in found.items()},
-    )
+    successes = group_by(((r["scenario"], r["method"]), r["success"]) for r in made if r["success"] is not None)
+    scenarios = list(dict.fromkeys(scenario for scenario, _ in successes))
+    rows = []
+    for those in (*([scenario] for scenario in scenarios), *[scenarios] * (len(scenarios) > 1)):
+        title = those[0] if len(those) == 1 else ALL
+        for method in compared:
+            several = [success for scenario in those for success in successes[scenario, method]]
+            rate = Rate(several.count(True), len(several))
+            low, high = rate.interval
+            rows.append(
+                {
+                    "scenario": title,
+                    "method": method,
+                    "trials": rate.trials,
+                    "successes": rate.successes,
+                    "success": 100.0 * (rate.rate or 0.0),
+                    "low": 100.0 * low,
+                    "high": 100.0 * high,
+                    **_pool_recall([recall[scenario] for scenario in those if scenario in recall]),
+                }
+            )
+    return rows
 
 
 def list_grids(
@@ -126,16 +107,11 @@ def list_grids(
     )
 
 
-def _count_successes(records: Sequence[TrialRecord], methods: Sequence[str]) -> dict[str, dict[str, Rate]]:
-    """Scenario -> method -> successes; trials whose demonstration failed do not count."""
-    counted = [record for record in records if record["success"] is not None]
-    scenarios = list(dict.fromkeys(record["scenario"] for record in counted))
+def _pool_recall(several: Iterable[PoseRecall]) -> dict[str, float | None]:
+    """Recall over the targets of several scenarios, in percent."""
+    found = list(several)
+    targets = sum(each.targets for each in found)
     return {
-        scenario: {method: _count(counted, scenario, method) for method in methods}
-        for scenario in (*scenarios, *[_ALL] * (len(scenarios) > 1))
+        name: 100.0 * sum(getattr(each, name) * each.targets for each in found) / targets if targets else None
+        for name in ("mssd", "mspd", "add")
     }
-
-
-def _count(records: Sequence[TrialRecord], scenario: str, method: str) -> Rate:
-    those = [r["success"] for r in records if r["method"] == method and scenario in (r["scenario"], _ALL)]
-    return Rate(those.count(True), len(those))
