@@ -167,7 +167,7 @@ def _score_poses(method: str, poses: Path, out: Path, as_json: bool, **how: Any)
     from apo_bench.io import write_file
     from apo_bench.viz.form_text import make_table
 
-    form = {"results": str(poses), "rows": score_poses((method,), poses, out.with_suffix(""), **how)}
+    form: dict[str, Any] = {"results": str(poses), "rows": score_poses((method,), poses, out.with_suffix(""), **how)}
     write_file(out, json.dumps(form, indent=1))
     if as_json:
         print_json(form)
