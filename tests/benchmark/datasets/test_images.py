@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from msgspec.structs import replace
 
-from apo_bench import InputError, load_scenario
+from apo_bench import InputError, TrialConfig, load_scenario
 from apo_bench.benchmark.datasets.images import make as made
 from apo_bench.benchmark.datasets.images.estimate import estimate_poses
 from apo_bench.benchmark.datasets.images.models import ImageObject, describe_model, make_model, measure_diameter
@@ -121,7 +121,7 @@ def test_models_are_centred_and_symmetries_leave_them_where_they_are(name: str, 
     for part, solid in load_scenario(name).assembly.solids.items():
         if part == "table":
             continue
-        each = ImageObject("file", solid, 0.25, (0.5, 0.25, 1.0))
+        each = ImageObject("file", 0.25, (0.5, 0.25, 1.0), solid)
         mesh = make_model(each)
         entry = describe_model(each, mesh.vertices)
         low = np.array([entry[f"min_{axis}"] for axis in "xyz"])
@@ -138,6 +138,19 @@ def test_models_are_centred_and_symmetries_leave_them_where_they_are(name: str, 
             turned = pose.apply(g, mesh.vertices)
             assert np.abs(turned.min(axis=0) - low).max() < 0.02 * entry["diameter"]
             assert np.abs(turned.max(axis=0) + low).max() < 0.02 * entry["diameter"]
+
+
+def test_equal_parts_are_one_object_also_in_several_scenarios() -> None:
+    names = ("stick_in_tower", "stick_on_castles", "gearbox")
+    loaded = {name: load_scenario(name) for name in names}
+    trials = [TrialConfig(name) for name in names]
+    objects = made.list_objects(trials, loaded)
+    scenes = made.describe_images(trials, loaded, objects, SMALL, "test").scenes
+    tower, castles, gearbox = (scenes[str(k)].parts for k in (1, 2, 3))
+    assert tower["castle1"] != tower["castle2"]  # of another colour
+    assert {tower[part] for part in ("castle1", "castle2", "stick")} >= {*castles.values()}
+    assert gearbox["disc1"] == gearbox["disc2"] == gearbox["disc3"] != gearbox["axle1"]
+    assert sorted({*tower.values(), *castles.values(), *gearbox.values()}) == [*range(1, len(objects) + 1)]
 
 
 def test_secret_trials_show_no_poses(tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def _find_object(scenario: Scenario, part: str, clearance_mm: float) -> ImageObj
     """The object of a part; its colour is that of the scenario, else of the first geom in its file."""
     path = scenario.part_files[part]
     color = scenario.colors.get(part) or read_part(path).model.geoms[0].rgba[:3]
-    return ImageObject(str(path), scenario.assembly.solids[part], clearance_mm, tuple(color))
+    return ImageObject(str(path), clearance_mm, tuple(color), scenario.assembly.solids[part])
 
 
 def _open_folder(out: Path, description: ImageDescription) -> None:

@@ -2,8 +2,9 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, final
 
 import numpy as np
 
@@ -25,16 +26,19 @@ _FINEST = 0.08
 """Longest edge of a mesh for evaluation, relative to the diameter: errors are means over vertices."""
 
 
-class ImageObject(NamedTuple):
+@final
+@dataclass(frozen=True)
+class ImageObject:
     """A shape and a colour that one or several parts have."""
 
     file: str
     """The file of its parts."""
-    solid: Solid
     clearance_mm: float
     """Clearance per side, by which the part is smaller than nominal."""
     color: tuple[float, ...]
     """Red, green and blue, from 0 to 1."""
+    solid: Solid = field(compare=False)
+    """The shape in the file."""
 
     @property
     def offset(self) -> Array:
