@@ -29,7 +29,7 @@ SHIFT = st.floats(-20.0, 20.0)
 
 
 def model(*symmetries: Array) -> EvaluatedModel:
-    return EvaluatedModel(CUBE, 40.0, np.array([np.eye(4), *symmetries]))
+    return EvaluatedModel(CUBE, CUBE, 40.0, np.array([np.eye(4), *symmetries]))
 
 
 def errors_of(estimate: Array, each: EvaluatedModel) -> Array:
