@@ -40,7 +40,7 @@ def noise_list() -> None:
     from apo_bench.viz.noise_sheet import list_models
 
     print_columns(list(list_models().items()))
-    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, or package.module:name")
+    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, poses:FILE.csv, or package.module:name")
 
 
 @commands.command("show", cls=Command)

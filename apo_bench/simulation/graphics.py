@@ -18,8 +18,11 @@ _SHADOW_REACH = 0.5
 
 
 @set_environment(_CHILDREN)
-def renderer(model: Any, width: int, height: int) -> Any:
+def renderer(model: Any, width: int, height: int, shadow_texels: int = _SHADOW_TEXELS) -> Any:
     """MuJoCo's renderer; on Linux without a display it uses EGL, unless MUJOCO_GL is set.
+
+    Args:
+        shadow_texels: Texels of the shadow map along a side; without a graphics card they take most of the time.
 
     Raises:
         InputError: No graphics driver can be used, or the picture is too large.
@@ -38,7 +41,7 @@ def renderer(model: Any, width: int, height: int) -> Any:
             importlib.reload(gl_context)  # MuJoCo chose when it was imported
         if gl_context.GLContext.__module__ == "mujoco.glfw" and _has_no_display():
             raise RuntimeError("there is no display")  # drawing without one, MuJoCo ends the process at the second try
-        model.vis.quality.shadowsize = _SHADOW_TEXELS
+        model.vis.quality.shadowsize = shadow_texels
         model.vis.map.shadowclip = _SHADOW_REACH
         return mujoco.Renderer(model, height, width)
     except ValueError:

@@ -4,12 +4,14 @@ from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
+    build_data,
     build_data_with_arm,
     check_film,
     copy_data,
     draw_picture,
     move_arm_home,
     place_for_picture,
+    release_renderer,
     save_film,
 )
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -41,6 +43,7 @@ __all__ = (
     "World",
     "aim_camera",
     "allow_sleep",
+    "build_data",
     "build_data_with_arm",
     "build_scene",
     "check_film",
@@ -55,6 +58,7 @@ __all__ = (
     "move_part",
     "place_for_picture",
     "project_to_pixels",
+    "release_renderer",
     "save_film",
     "set_part_pose",
     "switch_wrist_sensors_on",

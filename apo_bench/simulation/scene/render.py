@@ -44,7 +44,7 @@ def draw_picture(
         camera: `overview`, `close`, `top`, or the result of `aim_camera`.
         more: A function that adds geoms to MuJoCo's abstract scene.
     """
-    return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
+    return _draw(scene.shown, build_data(scene.shown, scene, poses), width, height, camera, more)
 
 
 def picture_with_arm(
@@ -67,7 +67,7 @@ def picture_with_arm(
 
 def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
     """The `mujoco.MjData` of the replay world that `picture_with_arm` shows."""
-    data = _at(scene.work, scene, poses)
+    data = build_data(scene.work, scene, poses)
     move_arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
@@ -156,7 +156,7 @@ class Film:
         _check_camera(scene.work, self.camera)
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        self._close = weakref.finalize(self, _release, self._renderer)
+        self._close = weakref.finalize(self, release_renderer, self._renderer)
         self._every = speed / fps
         self._next = 0.0
 
@@ -273,7 +273,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
         require_known("camera", camera, names, rest=" Or give the result of aim_camera.")
 
 
-def _at(world: World, scene: Scene, poses: Poses) -> Any:
+def build_data(world: World, scene: Scene, poses: Poses) -> Any:
     """A new state of a world with parts at `poses`, and parts that are not named at their starts."""
     data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
@@ -283,7 +283,7 @@ def _at(world: World, scene: Scene, poses: Poses) -> Any:
     return data
 
 
-def _release(renderer: Any) -> None:
+def release_renderer(renderer: Any) -> None:
     """Close a renderer in its own OpenGL context; in another one it would free that one's resources."""
     context = renderer._gl_context
     if context is not None:
