@@ -131,7 +131,7 @@ def _arrange_seen(intervals: RestIntervals, solved: CameraPose, task: Task) -> A
 def _reached(assembly: Assembly, intervals: RestIntervals, chosen: Chosen, k: int, X: Array) -> Poses:
     """Return the pose of every tracked part when observed operation k ended, world, [m]."""
     t = end_of_operation(intervals, chosen, k)
-    poses = find_rest_poses(intervals, t, chosen[: k + 1], list_settled(assembly, k))
+    poses = find_rest_poses(intervals, t, chosen[: k + 1], chosen[k + 1 :], list_settled(assembly, k))
     return {part: X @ T for part, T in poses.items()}
 
 

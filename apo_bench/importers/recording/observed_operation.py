@@ -56,8 +56,8 @@ def observed_operation(
         seen = seen @ pose.inverse(seen[-1]) @ image
     # Poses before this operation include what earlier operations put, even if their part came to rest after its begin.
     settled = max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
-    before = find_rest_poses(intervals, settled, chosen[:k], list_settled(assembly, k - 1))
-    after = find_rest_poses(intervals, ends, chosen[: k + 1], list_settled(assembly, k))
+    before = find_rest_poses(intervals, settled, chosen[:k], chosen[k:], list_settled(assembly, k - 1))
+    after = find_rest_poses(intervals, ends, chosen[: k + 1], chosen[k + 1 :], list_settled(assembly, k))
     # The displacement of the main part, in the frame of the camera, also moves whatever is fixed to it in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])
     carried = {

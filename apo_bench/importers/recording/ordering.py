@@ -88,7 +88,7 @@ def find_order(
     @cache
     def worth(k: int, interval: RestInterval) -> float:
         """Return the worth of an interval as the end of operation k."""
-        seen = find_rest_poses(intervals, interval.ends, (), list_settled(assembly, k))
+        seen = find_rest_poses(intervals, interval.ends, settled=list_settled(assembly, k))
         poses = {**start, **{part: T_world_camera @ T for part, T in seen.items()}}
         images = list_images(assembly.solids[interval.part], poses[interval.part])
         wrong_mm = min(contact_fit(assembly, k, {**poses, interval.part: T}).wrong_mm for T in images)
@@ -154,11 +154,11 @@ def time_taken(intervals: RestIntervals, before: Chosen, interval: RestInterval)
 
 
 def end_of_operation(intervals: RestIntervals, chosen: Chosen, k: int) -> float:
-    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest."""
+    """Return the time at which observed operation k had ended, [s]: when the next one began, else the end of its rest."""
     interval = chosen[k]
     assert interval is not None
     later = (time_taken(intervals, chosen[:j], each) for j, each in enumerate(chosen) if j > k and each is not None)
-    return float(np.clip(next(later, interval.ends), interval.begins, interval.ends))
+    return float(np.clip(next(later, interval.ends), interval.came, interval.ends))
 
 
 def list_settled(assembly: Assembly, k: int) -> set[str]:

@@ -90,7 +90,11 @@ def find_intervals(part: str, rests: Sequence[Rest]) -> tuple[RestInterval, ...]
 
 
 def find_rest_poses(
-    intervals: RestIntervals, t: float, ended: Collection[RestInterval | None] = (), settled: Collection[str] = ()
+    intervals: RestIntervals,
+    t: float,
+    ended: Collection[RestInterval | None] = (),
+    later: Collection[RestInterval | None] = (),
+    settled: Collection[str] = (),
 ) -> Poses:
     """Return the pose at which every part rests at a time, [s], or rested last: (4, 4), camera from part, [m].
 
@@ -98,11 +102,13 @@ def find_rest_poses(
 
     Args:
         ended: Intervals in which earlier operations left their parts, even if these were hidden until later.
+        later: Intervals in which later operations left their parts.
         settled: Parts that no later operation moves: where they rest after they were hidden, they were all the time.
     """
     poses = {}
     for part, known in intervals.items():
-        there = [each for each in known if (each.came if part in settled else each.begins) <= t or each in ended]
+        arrived = [each for each in known if (each.came if part in settled else each.begins) <= t or each in ended]
+        there = [each for each in arrived if each not in later]
         poses[part] = (there[-1] if there else known[0]).at(t).T
     return poses
 
