@@ -102,7 +102,7 @@ def make_tracks(scenario: Scenario, how: Disturbance, rng: np.random.Generator) 
     t, moved = motion(scenario.name)
     solids = scenario.assembly.solids
     start = place_layout(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm).start
-    still = {part: np.repeat(start[part][None], len(t), axis=0) for part in scenario.assembly.fixed}
+    still = {part: np.repeat(start[part][None], len(t), axis=0) for part in sorted(scenario.assembly.fixed)}
     T = {part: pose.inverse(CAMERA) @ add_errors(world, rng) for part, world in {**still, **moved}.items()}
     T = {part: flip(solids[part], track, how.flips, rng) for part, track in T.items()}
     seen = {part: rng.random(len(t)) >= how.lost for part in T}

@@ -11,7 +11,7 @@ from apo_bench.importers.recording.folding import are_alike, measure_distances
 from apo_bench.importers.recording.tracks import PoseTrack, span_of
 
 _FAR_M = 0.03  # a farther pose is as unlikely to be of a part as any other
-_SWITCH = 0.1
+_SWITCH = 0.4
 """Cost of another id than before; a distance of `_FAR_M` costs 1."""
 _GATE_M = 0.05  # a pose farther from the last one of a part is none of it
 _FASTEST_M_S = 1.5  # speed of a part, by which it may be farther
