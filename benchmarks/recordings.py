@@ -1,8 +1,8 @@
-"""Measure `recording import` on made recordings: `python -m benchmarks.recordings [--seeds 10] [--only DISTURBANCE ...]`.
+"""Measure `recording import` on made recordings: `python -m benchmarks.recordings [--seeds 10] [--only DISTURBANCE]`.
 
-Every part of every scenario is moved along straight lines and tracked by a camera whose pose is stated. Errors are
-Gaussian: one of each frame, and one that is constant while a part rests, both 0.5 mm and 0.5 degrees (1 sigma per axis).
-A rest is right if all six components of its error are within three stated standard deviations. It is wrong beyond six,
+Every part of every scenario moves along straight lines and is tracked by a camera whose pose is stated. Errors are
+Gaussian: one of each frame, and one that is constant during a rest, both 0.5 mm and 0.5 degrees (1 sigma per axis). A
+rest is right if all six components of its error are within three stated standard deviations. It is wrong beyond six,
 and silently wrong if the importer states no doubt. Writes `results/recordings.csv` and prints a table.
 """
 
@@ -32,9 +32,38 @@ from tests.recorded import CAMERA, motion
 
 RESULTS = Path(__file__).parent / "results" / "recordings.csv"
 SCENARIOS = (
-    "block_on_block bridge_cycle carried_bridge dovetail fixture_alignment gearbox l_bracket_on_plate nested_bushings "
-    "peg_in_hole pocket_table shaft_through_brackets stick_in_tower stick_on_castles vanished_fixture wedge_under_roof"
-).split()
+    "block_on_block",
+    "bridge_cycle",
+    "carried_bridge",
+    "dovetail",
+    "fixture_alignment",
+    "gearbox",
+    "l_bracket_on_plate",
+    "nested_bushings",
+    "peg_in_hole",
+    "pocket_table",
+    "shaft_through_brackets",
+    "stick_in_tower",
+    "stick_on_castles",
+    "vanished_fixture",
+    "wedge_under_roof",
+)
+    "block_on_block",
+    "bridge_cycle",
+    "carried_bridge",
+    "dovetail",
+    "fixture_alignment",
+    "gearbox",
+    "l_bracket_on_plate",
+    "nested_bushings",
+    "peg_in_hole",
+    "pocket_table",
+    "shaft_through_brackets",
+    "stick_in_tower",
+    "stick_on_castles",
+    "vanished_fixture",
+    "wedge_under_roof",
+]
 FRAME = 0.5 * np.repeat([1e-3, np.radians(1.0)], 3)  # standard deviations of each frame, and of each rest
 TURNS = 24  # images of a part of revolution
 HIDDEN_S = 3.0

@@ -43,7 +43,7 @@ class Arrangement(NamedTuple):
     fits: Mapping[int, ContactFit]
     """Observed operation, counted from 0 -> the misfit of its worst contact."""
     intervals: RestIntervals
-    """Rest intervals of each part from its start on, without pauses of a hand before it."""
+    """Rest intervals of each part."""
     tracks: Mapping[str, str] = {}
     """Part -> part whose track is its own; another one only among identical parts."""
 
@@ -101,20 +101,16 @@ def _arrange_seen(intervals: RestIntervals, solved: CameraPose, task: Task) -> A
     assembly, planned, goals, camera, stated, _ = task
     X = solved.T_world_camera
     expected = {**planned, **camera.places(planned)}
-    imaged = {
+    intervals = {
         part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ expected[part])
         for part, known in intervals.items()
     }
-    standing = {part: _since_standing(known, assembly, planned[part], X) for part, known in imaged.items()}
-    intervals = {part: standing[part] or known for part, known in imaged.items()}
     if stated.ends:
         order = stated_order(assembly, intervals, stated.ends)
     else:
         order = find_order(assembly, intervals, expected, X, stated.unseen)
     intervals, order = _image_as_in_contact(assembly, intervals, order, expected, goals, X)
-    begun = {part: X @ known[0].rests[0].T for part, known in intervals.items() if known[0] not in order.intervals}
-    start, source = find_starts({part: T for part, T in begun.items() if standing[part]}, camera, planned)
-    in_hand = {part: "in the hand" for part in intervals if not standing[part] and source[part] == "scenario"}
+    start, source = find_starts(intervals, order.intervals, X, task)
     fits = {
         k: contact_fit(
             assembly,
@@ -125,7 +121,7 @@ def _arrange_seen(intervals: RestIntervals, solved: CameraPose, task: Task) -> A
         for k, interval in enumerate(order.intervals)
         if interval is not None
     }
-    return Arrangement(solved, order, start, {**source, **in_hand}, fits, intervals)
+    return Arrangement(solved, order, start, source, fits, intervals)
 
 
 def _reached(assembly: Assembly, intervals: RestIntervals, chosen: Chosen, k: int, X: Array) -> Poses:
@@ -194,45 +190,31 @@ def _same_intervals(chosen: Chosen, intervals: RestIntervals, changed: RestInter
     return tuple(each and changed[each.part][intervals[each.part].index(each)] for each in chosen)
 
 
-def _since_standing(
-    known: Sequence[RestInterval], assembly: Assembly, planned: Array, X: Array
-) -> tuple[RestInterval, ...]:
-    """Return the rest intervals of a part from its start on; none if a hand held it in the air until its last place.
+def find_starts(intervals: RestIntervals, chosen: Chosen, X: Array, task: Task) -> tuple[Poses, Mapping[str, str]]:
+    """Return the start of every part, world, [m], and its source as in `Arrangement.start_source`.
 
-    A first interval in the air is a pause of the hand. Such intervals are dropped while at least one interval remains
-    for each operation that moves the part.
-
-    Args:
-        known: The intervals of the part, in order of time.
-        planned: Start of the part in the scenario, world, [m].
-        X: (4, 4), pose of the camera in the world.
+    It is the first rest that is no higher than planned, as a part in the air is held by a hand.
     """
-    part = known[0].part
-    pieces = assembly.solids[part].pieces
-    lowest = planned[2, 3] + measure_extent(pieces, planned[2, :3])[0]
-    moves = sum(operation.main == part for operation in assembly.operations)
-    for i in range(max(1, len(known) - moves)):  # keeps the first interval and one for each operation, at least
-        T = X @ known[i].rests[0].T
-        if part in assembly.fixed or T[2, 3] + measure_extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
-            return tuple(known[i:])
-    return ()
-
-
-def find_starts(observed: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses, Mapping[str, str]]:
-    """Return the start of every part, world, and its source as in `Arrangement.start_source`.
-
-    Args:
-        observed: First rest of tracked parts, world, [m].
-        planned: Start of all parts in the scenario, world, [m].
-    """
-    start = dict(planned)
-    source = dict.fromkeys(planned, "scenario")
-    for part, T in observed.items():
-        level = _level(planned[part], T)
-        start[part] = T if level is None else level
-        source[part] = "otherwise" if level is None else "seen"
-    known = camera.places(planned)
-    return {**start, **known}, {**source, **dict.fromkeys(known, "known")}  # places of the camera file take precedence
+    start = dict(task.planned)
+    source = dict.fromkeys(task.planned, "scenario")
+    for part, known in intervals.items():
+        ends = [i for i, each in enumerate(known) if each in chosen]
+        pieces = task.assembly.solids[part].pieces
+        poses = [X @ each.rests[0].T for each in known[: ends[0] if ends else None]]
+        heights = [T[2, 3] + measure_extent(pieces, T[2, :3])[0] for T in (task.planned[part], *poses)]
+        standing = [
+            T
+            for T, z in zip(poses, heights[1:], strict=True)
+            if part in task.assembly.fixed or z <= heights[0] + _HIGH_M
+        ]
+        if standing:
+            level = _level(task.planned[part], standing[0])
+            start[part] = standing[0] if level is None else level
+            source[part] = "otherwise" if level is None else "seen"
+        elif poses:
+            source[part] = "in the hand"
+    known_places = task.camera.places(task.planned)  # take precedence
+    return {**start, **known_places}, {**source, **dict.fromkeys(known_places, "known")}
 
 
 def _level(planned: Array, observed: Array) -> Array | None:

@@ -95,18 +95,19 @@ def find_order(
         return min(interval.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0
 
     choices = [_Choice(0.0, 0, ())]
-    for k in range(len(assembly)):
+    while len(choices[0].intervals) < len(assembly):
         longer = [each for choice in choices for each in _lengthen(choice, assembly, intervals, worth, unseen)]
         if not longer:
             break
         choices = _keep_best(longer)
+    reached = len(choices[0].intervals)
     choices = [_count_rest(choice, assembly, intervals) for choice in choices]
-    if len(choices[0].intervals) < len(assembly):  # the log may end before the last operations, if it shows no others
+    if reached < len(assembly):  # the log may end before the last operations, if it shows no others
         choices = [each for each in choices if any(each.intervals) and not each.unexplained]
     if not choices:
-        raise _explain_order(assembly, intervals, k)
+        raise _explain_order(assembly, intervals, reached)
     best = sorted(choices, key=lambda choice: -choice.value)
-    missing = (None,) * (len(assembly) - len(best[0].intervals))
+    missing = (None,) * (len(assembly) - reached)
     is_close = len(best) > 1 and best[0].value - best[1].value < _CLOSE
     return Order((*best[0].intervals, *missing), (*best[1].intervals, *missing) if is_close else None)
 
@@ -154,7 +155,7 @@ def time_taken(intervals: RestIntervals, before: Chosen, interval: RestInterval)
 
 
 def end_of_operation(intervals: RestIntervals, chosen: Chosen, k: int) -> float:
-    """Return the time at which observed operation k had ended, [s]: when the next one began, else the end of its rest."""
+    """Return the time when observed operation k had ended, [s]: when the next one began, else the end of its rest."""
     interval = chosen[k]
     assert interval is not None
     later = (time_taken(intervals, chosen[:j], each) for j, each in enumerate(chosen) if j > k and each is not None)
