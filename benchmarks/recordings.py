@@ -48,22 +48,6 @@ SCENARIOS = (
     "vanished_fixture",
     "wedge_under_roof",
 )
-    "block_on_block",
-    "bridge_cycle",
-    "carried_bridge",
-    "dovetail",
-    "fixture_alignment",
-    "gearbox",
-    "l_bracket_on_plate",
-    "nested_bushings",
-    "peg_in_hole",
-    "pocket_table",
-    "shaft_through_brackets",
-    "stick_in_tower",
-    "stick_on_castles",
-    "vanished_fixture",
-    "wedge_under_roof",
-]
 FRAME = 0.5 * np.repeat([1e-3, np.radians(1.0)], 3)  # standard deviations of each frame, and of each rest
 TURNS = 24  # images of a part of revolution
 HIDDEN_S = 3.0

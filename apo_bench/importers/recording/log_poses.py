@@ -93,7 +93,7 @@ def _select_scene(table: LogTable, how: Conventions) -> LogTable:
         f"{table.file}: a recording is one scene, and the file holds "
         f"{', '.join(f'{x:.0f}' for x in scenes[:6].tolist())}; state `scene` in the camera file.",
     )
-    kept = np.flatnonzero(of == scene)
+    kept = np.flatnonzero(of == scene).tolist()
     cells = {meaning: [own[i] for i in kept] for meaning, own in table.cells.items()}
     return table._replace(cells=cells, places=[table.places[i] for i in kept])
 
