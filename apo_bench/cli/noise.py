@@ -98,7 +98,6 @@ def noise_fit(
     Examples:
       apo-bench noise fit --estimates results.csv --truth scene_gt.json --out mine.toml
       apo-bench noise fit --estimates results.csv --truth test --residuals mine.csv --picture fit.png
-      apo-bench noise fit --estimates r.csv --truth test --scenario pocket_table --objects o.toml --out mine.toml
     """
     from apo_bench.formats.bop import read_results
     from apo_bench.formats.bop_models import find_models_info, read_symmetries
