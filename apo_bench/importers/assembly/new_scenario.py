@@ -16,7 +16,7 @@ from apo_bench.importers.assembly.contact_search import (
     find_walls_without_play,
 )
 from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
-from apo_bench.importers.assembly.grasps import GraspSearchResult, find_grasps
+from apo_bench.importers.assembly.grasps import GoalRoom, GraspSearchResult, find_grasps
 from apo_bench.importers.assembly.order_search import OrderSearch, Placement
 from apo_bench.importers.assembly.posed_parts import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
@@ -105,7 +105,9 @@ def new_scenario(
     ]
     reach = find_reach(solids, poses, [each.name for each in parts])
     aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
-    search = OrderSearch(solids, poses, contacts, aside, wanted_order)
+    held = {each.name for each in parts if each.held}
+    room = GoalRoom(solids, poses)
+    search = OrderSearch(solids, poses, contacts, aside, wanted_order, held, room.has_room)
     order = search.find(frozenset(base))
     if order is None:
         raise NoAssemblyOrder(
