@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from apo_bench.geometry import PAD_M, Array, PadPlace, Solid, find_holds, measur
 from apo_bench.importers.assembly.order_search import Placement
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.planning.insertion.arrival import plan_arrival
+from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.finding import find_arm
@@ -117,7 +119,8 @@ def _plan_stroke(solids: Mapping[str, Solid], placing: Placement, now: Poses, go
         goal: The main part at its goal, with the obstacles there.
     """
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
-    line = plan_arrival_line(plan_arrival(assembly, placing.moves, placing.contacts, now), goal.T)
+    arrival = plan_arrival(assembly, placing.moves, placing.contacts, now, Preference(placing.along))
+    line = plan_arrival_line(arrival, goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
@@ -135,15 +138,20 @@ def _list_holds_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator
 
 def _grazes(solid: Solid, hold: PadPlace, up: Array) -> bool:
     """Whether the upper or lower end of a pad lies just inside a piece, such as a chamfer, which it would push away."""
-    along = np.cross(up, hold.across)
-    at = np.array([hold.point @ axis for axis in (along, up, hold.across)])
-    pad = np.array([[-PAD_M[0], PAD_M[0]], [-PAD_M[1], PAD_M[2]], [-hold.half_width, hold.half_width]]) + at[:, None]
-    for piece in solid.pieces:
-        reach = np.array([measure_extent((piece,), axis) for axis in (along, up, hold.across)])
-        common = np.minimum(pad[:, 1], reach[:, 1]) - np.maximum(pad[:, 0], reach[:, 0])
-        if (common > 0.0).all() and common[1] < min(_GRAZE_M, float(np.ptp(reach[1])) - _SAME_M):
-            return True
-    return False
+    axes = np.array([np.cross(up, hold.across), up, hold.across])
+    half = np.array([[-PAD_M[0], PAD_M[0]], [-PAD_M[1], PAD_M[2]], [-hold.half_width, hold.half_width]])
+    pad = half + (axes @ hold.point)[:, None]
+    reach = _measure_extents(solid, tuple(map(tuple, np.round(axes, 9).tolist())))
+    common = np.minimum(pad[:, 1], reach[:, :, 1]) - np.maximum(pad[:, 0], reach[:, :, 0])
+    is_edge = common[:, 1] < np.minimum(_GRAZE_M, np.ptp(reach[:, 1], axis=1) - _SAME_M)
+    return bool(((common > 0.0).all(axis=1) & is_edge).any())
+
+
+@lru_cache(maxsize=64)
+def _measure_extents(solid: Solid, axes: tuple[tuple[float, ...], ...]) -> Array:
+    """Return the least and greatest coordinate of each piece along some axes, (pieces, axes, 2), [m]."""
+    along = [np.array(axis) for axis in axes]
+    return np.array([[measure_extent((piece,), axis) for axis in along] for piece in solid.pieces])
 
 
 def _choose_best_by_height(places: Iterable[PadPlace], up: Array) -> Iterator[PadPlace]:

@@ -18,6 +18,7 @@ from apo_bench.importers.assembly.contact_search import find_contacts
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.planning.insertion.arrival import Arrival, plan_arrival
+from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.planning.prediction.stability import BALANCED, measure_imbalance
 
@@ -25,6 +26,7 @@ _FALLS_M = 7e-4
 """Largest drop of a part that still counts as carried: a part in a hole drops by its play."""
 _CARRIES = 1e-3
 """A contact carries weight if the vertical component of its normal is at least this."""
+_SAME = 1e-6  # directions whose cosine differs from 1 by less are equal
 _SEAT = 0.5
 """A face ends an insertion if the cosine of its normal with the opposite of the direction is at least this."""
 _MOST_SETS = 4000
@@ -53,6 +55,8 @@ class Placement(NamedTuple):
     """The reason as a phrase: the direction of insertion and the parts that carry the main part."""
     clamped: bool = False
     """Whether only fasteners, which are no parts, hold the main part."""
+    along: Array | None = None
+    """Direction of insertion to state, frame of the main part, (3,); None: the planner's own choice."""
 
 
 def _always(part: str, there: Sequence[str]) -> bool:
@@ -173,14 +177,18 @@ class OrderSearch:
         arrival = plan_arrival(assembly, moves, contacts, poses)
         if falls is None and all(each.normal @ UP < _CARRIES for each in arrival.touched):
             falls = RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
-        if falls is not None and not (main in self.held and self._has_seat(arrival)):
-            return falls
+        if falls is not None:
+            arrival = self._find_seated_arrival(assembly, moves, contacts, arrival) if main in self.held else None
+            if arrival is None:
+                return falls
         if not arrival.free:
             return RemovalObstacle(3, f"'{main}' cannot leave {others}")
         way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
-        return Placement(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}", falls is not None)
+        stated = None if falls is None else arrival.line.direction
+        why = f"comes {direction}, onto {others}"
+        return Placement(tuple(moves), contacts, poses[main], why, falls is not None, stated)
 
     def _find_fall(
         self, moves: Sequence[str], rest: Sequence[str], contacts: tuple[Contact, ...], assembly: Assembly, others: str
@@ -201,10 +209,23 @@ class OrderSearch:
             return None
         return RemovalObstacle(2, f"'{main}' would not keep its balance on {others}, which would be there before it")
 
-    def _has_seat(self, arrival: Arrival) -> bool:
-        """Whether the insertion ends on a face, so that the robot feels when the part is in place."""
-        way = arrival.T[:3, :3] @ arrival.line.direction
-        return any(each.normal @ way < -_SEAT for each in arrival.touched)
+    def _find_seated_arrival(
+        self, assembly: Assembly, moves: Sequence[str], contacts: tuple[Contact, ...], first: Arrival
+    ) -> Arrival | None:
+        """Return an arrival that ends on a face, so that the robot feels when a part that is clamped is in place.
+
+        Args:
+            first: The arrival without a preferred direction.
+        """
+        R = first.T[:3, :3]
+        ways = [R @ first.line.direction, *(-each.normal for each in first.touched)]
+        for way in ways:
+            if all(each.normal @ way > -_SEAT for each in first.touched):
+                continue  # nothing stops the part
+            arrival = plan_arrival(assembly, moves, contacts, self.poses, Preference(R.T @ way))
+            if arrival.free and R @ arrival.line.direction @ way > 1.0 - _SAME:
+                return arrival
+        return None
 
     def _can_preassemble(self, group: tuple[str, ...]) -> tuple[Placement, ...] | None:
         """Return the operations that assemble a group next to the assembly, its main part on the table.

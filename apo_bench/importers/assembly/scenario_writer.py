@@ -132,6 +132,8 @@ def _list_operation_lines(new: NewScenario, placing: Placement) -> Iterator[str]
     yield f"goal = {_format_pose(placing.at)}"
     pairs = [f'["{m.face if m.part == main else m}", "{e}"]' for m, e in placing.contacts]
     line = f"contacts = [{', '.join(pairs)}]"
+    if placing.along is not None:
+        yield f"attach = {{ along = {_format_list(placing.along)} }}"
     if placing.clamped:
         yield "clamp = true  # a fastener that is no part holds it: it is fixed here once its seat is felt"
     yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]

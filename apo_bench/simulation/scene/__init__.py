@@ -1,5 +1,6 @@
 """Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
+from apo_bench.simulation.scene.clamps import clamp, list_clamps, loosen
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
@@ -44,12 +45,15 @@ __all__ = (
     "build_data_with_arm",
     "build_scene",
     "check_film",
+    "clamp",
     "compute_only",
     "copy_data",
     "draw_picture",
     "get_part_pose",
     "has_failed",
     "is_unstable",
+    "list_clamps",
+    "loosen",
     "make_initial_state",
     "move_arm_home",
     "move_part",
