@@ -6,7 +6,17 @@ from typing import Annotated, Literal
 import typer
 
 from apo_bench.cli.part import Density
-from apo_bench.cli.scenario import ClearanceMm, Fits, Fixed, MaxOverlapMm, Order, Overwrite, Up, parse_names, write_new_scenario
+from apo_bench.cli.scenario import (
+    ClearanceMm,
+    Fits,
+    Fixed,
+    MaxOverlapMm,
+    Order,
+    Overwrite,
+    Up,
+    parse_names,
+    write_new_scenario,
+)
 from apo_bench.cli.shared import Command, check_output, make_group, make_path_option, parse_path
 
 _HELP = """
@@ -40,7 +50,9 @@ def assembly_import(
     fits: Fits = "auto",
     fasteners: Annotated[
         Literal["clamp", "parts"],
-        typer.Option(help="clamp leaves screws and nuts out and fixes what only they hold; parts treats them as parts."),
+        typer.Option(
+            help="clamp leaves screws and nuts out and fixes what only they hold; parts treats them as parts."
+        ),
     ] = "clamp",
     density: Density = 1000.0,
     skip: Annotated[list[str] | None, typer.Option(help="Name of a solid to leave out; may be repeated.")] = None,

@@ -45,4 +45,7 @@ DEFAULT_CHOICES = AssemblyChoices()
 
 def check_density(density: float) -> None:
     """Raise InputError unless a density, [kg/m^3], is one that a part may have."""
-    require(DENSITY[0] <= density <= DENSITY[1], f"density must be {DENSITY[0]:g} to {DENSITY[1]:g} kg/m^3, got {density:g}.")
+    require(
+        DENSITY[0] <= density <= DENSITY[1],
+        f"density must be {DENSITY[0]:g} to {DENSITY[1]:g} kg/m^3, got {density:g}.",
+    )

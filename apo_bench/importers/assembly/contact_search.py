@@ -125,9 +125,7 @@ def _find_tight_fit(
     return ""
 
 
-def find_coaxial_pairs(
-    a: Solid, T_a: Array, b: Solid, T_b: Array
-) -> Iterator[tuple[RoundFace, RoundFace, float]]:
+def find_coaxial_pairs(a: Solid, T_a: Array, b: Solid, T_b: Array) -> Iterator[tuple[RoundFace, RoundFace, float]]:
     """Yield each shaft of one solid on the axis of a hole of the other, face of `a` first, and the radius of the hole
     minus that of the shaft, [m]."""
     for wall, other in product(a.rounds.values(), b.rounds.values()):

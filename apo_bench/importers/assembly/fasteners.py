@@ -11,7 +11,8 @@ from apo_bench.geometry import Array, pose
 from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
 
 _NAME = re.compile(
-    r"(?<![a-z])(screws?|bolts?|nuts?|washers?|(?:threaded|brass|heat[ _-]?set)[ _-]*inserts?|heat[ _-]?sets?|setscrews?|schrauben?|muttern?|"
+    r"(?<![a-z])(screws?|setscrews?|bolts?|nuts?|washers?|schrauben?|muttern?|heat[ _-]?sets?|"
+    r"(?:threaded|brass|heat[ _-]?set)[ _-]*inserts?|"
     r"(?:iso|din|ansi|asme|en)[ _-]?\d{2,5}|m\d+(?:[.,]\d+)?[ _-]?x[ _-]?\d+)(?![a-z])",
     re.IGNORECASE,
 )
@@ -71,7 +72,9 @@ def _recognise(raw: RawSolid, others: Sequence[RawSolid]) -> str:
         return f"'{named}' in its name"
     shanks = [region for region in raw.regions if region.kind == "cylinder" and region.is_whole and not region.hole]
     for shank in shanks:
-        has_head = any(_is_coaxial(shank, other, np.eye(4)) and max(other.radii) > _HEAD * shank.radii[0] for other in shanks)
+        has_head = any(
+            _is_coaxial(shank, other, np.eye(4)) and max(other.radii) > _HEAD * shank.radii[0] for other in shanks
+        )
         if has_head and any(_list_threads(raw, shank, other) for other in others):
             return "its shank overlaps a hole as a thread does"
     return ""

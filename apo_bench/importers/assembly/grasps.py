@@ -57,7 +57,7 @@ def find_grasps(
         order: The operations in their order.
         base: The fixed parts.
     """
-    kinematics = Kinematics(find_arm(_ARM))
+    kinematics = find_kinematics()
     arm = kinematics.arm
     best: dict[str, Grasp | None] = {}
     crowded = set[str]()
@@ -85,6 +85,12 @@ def find_grasps(
     return GraspSearchResult(best, frozenset(crowded))
 
 
+@lru_cache(maxsize=1)
+def find_kinematics() -> Kinematics:
+    """Return the kinematics of the arm for which grasps and starts are chosen."""
+    return Kinematics(find_arm(_ARM))
+
+
 class GoalRoom:
     """Whether the open gripper has room to hold each part at its goal, among any set of other parts."""
 
@@ -92,7 +98,7 @@ class GoalRoom:
         """Take all parts at their final poses, world, [m]."""
         self._solids = solids
         self._poses = poses
-        self._kinematics = Kinematics(find_arm(_ARM))
+        self._kinematics = find_kinematics()
         self._known: dict[tuple[str, tuple[str, ...]], bool] = {}
 
     def has_room(self, part: str, there: Sequence[str]) -> bool:

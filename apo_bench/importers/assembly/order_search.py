@@ -178,9 +178,10 @@ class OrderSearch:
         if falls is None and all(each.normal @ UP < _CARRIES for each in arrival.touched):
             falls = RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
         if falls is not None:
-            arrival = self._find_seated_arrival(assembly, moves, contacts, arrival) if main in self.held else None
-            if arrival is None:
+            seated = self._find_seated_arrival(assembly, moves, contacts, arrival) if main in self.held else None
+            if seated is None:
                 return falls
+            arrival = seated
         if not arrival.free:
             return RemovalObstacle(3, f"'{main}' cannot leave {others}")
         way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world

@@ -14,9 +14,7 @@ _UP_AXES = ("z", "-z", "x", "-x", "y", "-y")  # in the order of the attempts
 _MOST_BASES = 3  # of the lowest parts that are tried as base
 
 
-def new_upright_scenario(
-    parts: Sequence[PosedPart], choices: AssemblyChoices = DEFAULT_CHOICES
-) -> NewScenario:
+def new_upright_scenario(parts: Sequence[PosedPart], choices: AssemblyChoices = DEFAULT_CHOICES) -> NewScenario:
     """Make a scenario from an assembly with one axis of its poses up.
 
     Raises:

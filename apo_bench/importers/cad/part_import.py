@@ -115,7 +115,9 @@ def import_solid(
     density, repairs = _choose_density(source, raw.mesh.volume, density)
     raw = replace(raw, repairs=(*raw.repairs, *repairs))
     flats, rounds, refused = make_contact_faces(raw)
-    require(flats or rounds, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is.")
+    require(
+        flats or rounds, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is."
+    )
     try:
         pieces = cut_solid(raw, others) if pieces is None else pieces
     except InputError as error:

@@ -28,7 +28,7 @@ from apo_bench.simulation.robot import (
     translate,
 )
 from apo_bench.simulation.robot.paths import distance
-from apo_bench.simulation.scene import clamp, loosen
+from apo_bench.simulation.scene import release_clamp, weld_clamp
 
 _LIFT = (0.4, 0.25)  # peak speeds of lifting [m/s]: of a single part, and of one that carries others
 _CARRY = (0.5, 0.35)  # as `_LIFT`, through the air
@@ -69,7 +69,7 @@ def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
     """
-    loosen(robot.scene.work, robot.data, t.part)
+    release_clamp(robot.scene.work, robot.data, t.part)
     for other in t.squaring:
         robot.stage = "pick"
         centre(robot, t, other, t.T_world_start)
@@ -205,7 +205,7 @@ def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
         left: What is left of the insertion, [m].
     """
     if t.clamps_to and robot.felt and left <= _ARRIVED_M:
-        clamp(robot.scene.work, robot.data, t.part, t.clamps_to)
+        weld_clamp(robot.scene.work, robot.data, t.part, t.clamps_to)
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:

@@ -13,7 +13,7 @@ from apo_bench.simulation.robot import (
     smooth_trajectory,
     translate,
 )
-from apo_bench.simulation.scene import clamp, loosen
+from apo_bench.simulation.scene import release_clamp, weld_clamp
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
@@ -37,7 +37,7 @@ _SETTLE_S = 0.15
 
 def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
     """Carry out an operation, and wait until everything rests."""
-    loosen(hands.world, hands.data, operation.part)
+    release_clamp(hands.world, hands.data, operation.part)
     T = hands.grab(0, operation.part)
     for part in operation.carries:
         hands.add(0, part)
@@ -56,7 +56,7 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
         hands.move((0, smooth_trajectory(beside, goal, _SHIFT)))
         hands.wait(0.05)
     if operation.clamps_to:
-        clamp(hands.world, hands.data, operation.part, operation.clamps_to)
+        weld_clamp(hands.world, hands.data, operation.part, operation.clamps_to)
     hands.let_go(0, operation.part, *operation.carries)
     hands.wait(STAND_STILL_S)
 

@@ -1,6 +1,6 @@
 """Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
-from apo_bench.simulation.scene.clamps import clamp, list_clamps, loosen
+from apo_bench.simulation.scene.clamps import list_clamps, release_clamp, weld_clamp
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
@@ -45,7 +45,6 @@ __all__ = (
     "build_data_with_arm",
     "build_scene",
     "check_film",
-    "clamp",
     "compute_only",
     "copy_data",
     "draw_picture",
@@ -53,12 +52,12 @@ __all__ = (
     "has_failed",
     "is_unstable",
     "list_clamps",
-    "loosen",
     "make_initial_state",
     "move_arm_home",
     "move_part",
     "place_for_picture",
     "project_to_pixels",
+    "release_clamp",
     "save_film",
     "set_part_pose",
     "switch_wrist_sensors_on",
@@ -66,4 +65,5 @@ __all__ = (
     "touches_others",
     "use_timestep",
     "wake",
+    "weld_clamp",
 )

@@ -14,7 +14,7 @@ def list_clamps(scenario: Scenario) -> dict[str, str]:
     return {each.main: each.contacts[0].environment.part for each in clamped}
 
 
-def clamp(world: World, data: Any, part: str, other: str) -> None:
+def weld_clamp(world: World, data: Any, part: str, other: str) -> None:
     """Fix a part to another one at their present poses."""
     model = world.model
     weld = model.equality(f"{CLAMP}{part}").id
@@ -24,7 +24,7 @@ def clamp(world: World, data: Any, part: str, other: str) -> None:
     data.eq_active[weld] = 1
 
 
-def loosen(world: World, data: Any, part: str) -> None:
+def release_clamp(world: World, data: Any, part: str) -> None:
     """Release the clamp of a part, if it has one."""
     for weld in world.clamps:
         if world.model.equality(weld).name == f"{CLAMP}{part}":

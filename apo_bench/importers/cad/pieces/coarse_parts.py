@@ -25,9 +25,7 @@ def cut_into_coarse_parts(body: Any, raw: RawSolid, beside: HollowSpace) -> Iter
     """
     volume = body.volume()
     flats = beside.flats[_find_near_faces(raw, beside)]
-    first = list(
-        cut_at_reflex_edges(CutPart(body, np.zeros((0, 4))), beside.size, flats, True, [_MOST_CUTS], volume)
-    )
+    first = list(cut_at_reflex_edges(CutPart(body, np.zeros((0, 4))), beside.size, flats, True, [_MOST_CUTS], volume))
     most = max(2, _MOST_HULLS // len(first)) if first else 0
     for part in first:
         yield from bisect_hollow_part(part, beside.size, volume, most)
@@ -39,7 +37,10 @@ def _find_near_faces(raw: RawSolid, beside: HollowSpace) -> Array:
     if beside.others is None:
         return np.ones(len(flats), dtype=np.bool_)
     middles = raw.mesh.corners[raw.mesh.triangles].mean(axis=1)
-    reach = [_NEAR_MM + float(np.ptp(raw.mesh.corners[raw.mesh.triangles[r.triangles]], axis=(0, 1)).max()) / 2 for r in flats]
+    reach = [
+        _NEAR_MM + float(np.ptp(raw.mesh.corners[raw.mesh.triangles[r.triangles]], axis=(0, 1)).max()) / 2
+        for r in flats
+    ]
     return np.array(
         [
             np.isfinite(beside.others.query(middles[region.triangles], distance_upper_bound=far)[0]).any()

@@ -9,8 +9,8 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts
+from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
 from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace
 from apo_bench.importers.cad.pieces.plane_cuts import cut_at_shoulders, cut_into_convex_parts, snap_to_planes

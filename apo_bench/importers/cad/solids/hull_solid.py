@@ -1,6 +1,5 @@
 """The convex hull of corners as a solid, for solids whose surface is open or crosses itself."""
 
-
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
@@ -29,4 +28,6 @@ def make_hull_solid(name: str, corners: Array, places: tuple[SolidPlace, ...], w
     inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
     triangles[inwards] = triangles[inwards, ::-1]
     whole = Mesh(corners, triangles)
-    return RawSolid(name, whole.part(np.arange(len(triangles))), places, (f"its convex hull stands for it: {why.rstrip('.')}",))
+    return RawSolid(
+        name, whole.part(np.arange(len(triangles))), places, (f"its convex hull stands for it: {why.rstrip('.')}",)
+    )
