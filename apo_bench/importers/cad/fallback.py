@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial import ConvexHull
+from shapely.errors import ShapelyError
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull, Solid
@@ -17,6 +18,8 @@ from apo_bench.importers.cad.solids import RawSolid
 
 _STEP_MM = 1.0  # distance of the sampled points of the surface
 _MOST_POINTS = 4000
+_FAULTS = (InputError, ValueError, RuntimeError, ShapelyError)
+"""What the import of a solid with a bad surface may raise, by this package or by the libraries that cut it."""
 
 
 def import_solid_anyway(
@@ -31,18 +34,20 @@ def import_solid_anyway(
     """
     try:
         return import_solid(raw, name, folder, source, density, others)
-    except InputError as error:
-        failed = error
+    except _FAULTS as error:
+        failed: Exception = error
     for cut, words in _list_cuts(raw, others):
         try:
             part = import_solid(raw, name, folder, source, density, others, cut())
-        except InputError as error:
+        except _FAULTS as error:
             failed = error
             continue
         off = measure_deviation(raw, part.solid)
         repair = f"{words}: they differ from it by up to {off:.2g} mm, and `scenario check` shows whether that matters"
         return replace(part, raw=replace(part.raw, repairs=(*part.raw.repairs, repair)))
-    raise failed
+    if isinstance(failed, InputError):
+        raise failed
+    raise InputError(f"{source}: the solid makes no part ({failed}); save it again, or draw it simpler.") from failed
 
 
 def _list_cuts(raw: RawSolid, others: Array | None) -> Iterator[tuple[Callable[[], CutSolid], str]]:
