@@ -1,5 +1,6 @@
 """Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
+from apo_bench.simulation.scene.clamps import list_clamps, release_clamp, weld_clamp
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
@@ -53,11 +54,13 @@ __all__ = (
     "get_part_pose",
     "has_failed",
     "is_unstable",
+    "list_clamps",
     "make_initial_state",
     "move_arm_home",
     "move_part",
     "place_for_picture",
     "project_to_pixels",
+    "release_clamp",
     "release_renderer",
     "save_film",
     "set_part_pose",
@@ -66,4 +69,5 @@ __all__ = (
     "touches_others",
     "use_timestep",
     "wake",
+    "weld_clamp",
 )
