@@ -2,6 +2,7 @@
 
 from apo_bench.simulation.scene.clamps import list_clamps, release_clamp, weld_clamp
 from apo_bench.simulation.scene.composing import HANDS
+from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
@@ -12,9 +13,9 @@ from apo_bench.simulation.scene.render import (
     draw_picture,
     move_arm_home,
     place_for_picture,
-    release_renderer,
     save_film,
 )
+from apo_bench.simulation.scene.scaled_physics import PhysicsScale, ScaledPhysics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import (
     WRIST_SENSORS,
@@ -33,11 +34,16 @@ from apo_bench.simulation.scene.world import (
     use_timestep,
     wake,
 )
+from apo_bench.simulation.scene.wrist_camera import WRIST_CAMERA
 
 __all__ = (
     "HANDS",
+    "WRIST_CAMERA",
     "WRIST_SENSORS",
+    "KeptRenderer",
     "Marks",
+    "PhysicsScale",
+    "ScaledPhysics",
     "Scene",
     "ShiftArrows",
     "TurnRing",
@@ -61,7 +67,6 @@ __all__ = (
     "place_for_picture",
     "project_to_pixels",
     "release_clamp",
-    "release_renderer",
     "save_film",
     "set_part_pose",
     "switch_wrist_sensors_on",
