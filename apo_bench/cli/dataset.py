@@ -81,7 +81,7 @@ def dataset_make(
     ] = None,
     policy: Annotated[
         str | None,
-        typer.Option(help="Policy of insertions: expert (default), straight, dagger-insert, or package.module:name."),
+        typer.Option(help="Policy of insertions: expert (default), straight, spiral, searcher, probe, or module:name."),
     ] = None,
     split: Annotated[
         str, typer.Option(help="With --format bop: test, or val (images to fit noise to; other seeds).")

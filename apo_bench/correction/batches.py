@@ -8,9 +8,10 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.checks.correction_checks import check_observations
 from apo_bench.correction.contact.contact import ContactCorrector
-from apo_bench.correction.correctors import CORRECTOR, correct, resolve_corrector
+from apo_bench.correction.correctors import correct, resolve_corrector
 from apo_bench.correction.robust.robust import RobustCorrector
 from apo_bench.errors import require
+from apo_bench.records import CORRECTOR
 
 BATCH = 150
 """Most observations that are solved together."""

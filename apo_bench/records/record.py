@@ -184,7 +184,7 @@ class TrialRecord(_Columns, total=False):
 
     The text also states the factor by which the drive of the gripper was made stronger.
     """
-    reached: dict[str, _Pose] | None
+    final_poses: dict[str, _Pose] | None
     """Part -> its final pose: x, y, z [mm], qw, qx, qy, qz, world frame."""
     pose_error_fixed_mm: _Size | None
     """Root mean square distance of final poses from the truth, along directions that contacts fix [mm]."""

@@ -35,7 +35,7 @@ def hash_input_files(
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
     Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
-    the weights of networks, and the judge's thresholds.
+    and the judge's thresholds.
 
     Args:
         source: The scenario as given to `load_scenario`.
@@ -46,7 +46,6 @@ def hash_input_files(
         **{f"part {part}": read_part(path).files for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml",),
         "arm": arm_files if isinstance(arm_files, tuple) else (arm_files,),
-        "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
     }
     return {
         "scenario": _digest_scenario(scenario, source),

@@ -121,7 +121,7 @@ def fill_replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> Tr
         "least_overlap": replace_infinite(conditions.overlap),
         "penetration_mm": replace_infinite(conditions.penetration_mm),
         "placed_part_shift_mm": replace_infinite(conditions.placed_part_shift_mm),
-        "reached": _format_poses(result.reached.final),
+        "final_poses": _format_poses(result.reached.final),
         "pose_error_fixed_mm": replace_infinite(fixed),
         "pose_error_free_mm": replace_infinite(free),
         "peak_force_n": replace_infinite(result.peak_force_n),

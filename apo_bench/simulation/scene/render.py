@@ -1,6 +1,5 @@
 """Render pictures and films of a scene, and show a replay in a window."""
 
-import weakref
 from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +14,8 @@ from apo_bench.assembly import Poses
 from apo_bench.errors import InputError, missing_package, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.io import write_file
-from apo_bench.simulation.graphics import need_window, renderer
+from apo_bench.simulation.graphics import SHADOW_TEXELS, need_window, renderer
+from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
 
@@ -154,9 +154,7 @@ class Film:
         self.camera = camera or aim_camera(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         _check_camera(scene.work, self.camera)
-        self._renderer = renderer(scene.work.model, width, height)
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        self._close = weakref.finalize(self, release_renderer, self._renderer)
+        self._renderer = KeptRenderer(scene.work.model, width, height, SHADOW_TEXELS if shadows else 0)
         self._every = speed / fps
         self._next = 0.0
 
@@ -168,8 +166,7 @@ class Film:
 
     def shot(self, data: Any) -> _Image:
         """Return an image of a state (`mujoco.MjData`), (height, width, 3), uint8, without keeping it."""
-        self._renderer.update_scene(data, camera=self.camera)
-        return np.array(self._renderer.render())
+        return self._renderer.draw(data, self.camera)
 
     @check_arguments
     def save(self, path: str | Path) -> None:
@@ -185,7 +182,7 @@ class Film:
 
     def close(self) -> None:
         """Free the renderer; this also happens when the film is deleted."""
-        self._close()
+        self._renderer.close()
 
 
 def check_film(path: Path) -> None:
@@ -281,11 +278,3 @@ def build_data(world: World, scene: Scene, poses: Poses) -> Any:
     data.mocap_pos[:, 2] = -1.0  # hands are hidden below the table
     mujoco.mj_forward(world.model, data)
     return data
-
-
-def release_renderer(renderer: Any) -> None:
-    """Close a renderer in its own OpenGL context; in another one it would free that one's resources."""
-    context = renderer._gl_context
-    if context is not None:
-        context.make_current()
-    renderer.close()

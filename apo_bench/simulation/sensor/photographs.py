@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple, final
 
 import mujoco
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Poses
 from apo_bench.geometry import Array, Ints, collect_corners, pose
 from apo_bench.perception.depth_camera.range_finder import PinholeView
-from apo_bench.simulation.graphics import renderer
-from apo_bench.simulation.scene import Scene, aim_camera, build_data, release_renderer
+from apo_bench.simulation.scene import KeptRenderer, Scene, aim_camera, build_data
 from apo_bench.simulation.sensor.rays import ModelRays
 
 _MARGIN_PX = 2
@@ -76,7 +76,8 @@ class Photographer:
         self._cast = ModelRays(scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm)
         self._world = replace(scene.shown, model=copy.copy(scene.shown.model))  # whose lights and colours may change
         self._world.model.vis.global_.fovy = view.fov_deg  # of free cameras
-        self._renderer = renderer(self._world.model, view.width, view.height, _SHADOW_TEXELS) if colours else None
+        size = view.width, view.height
+        self._renderer = KeptRenderer(self._world.model, *size, _SHADOW_TEXELS) if colours else None
 
     def vary(self, rng: np.random.Generator) -> None:
         """Draw other directions and brightnesses of the lights, and another colour of the fixed parts."""
@@ -106,7 +107,7 @@ class Photographer:
     def close(self) -> None:
         """Free the renderer, before another one is made."""
         if self._renderer is not None:
-            release_renderer(self._renderer)
+            self._renderer.close()
             self._renderer = None
 
     def _render(self, view: PinholeView, poses: Poses) -> NDArray[np.uint8] | None:
@@ -117,9 +118,7 @@ class Photographer:
         azimuth = np.degrees(np.arctan2(forward[1], forward[0]))
         elevation = np.degrees(np.arcsin(forward[2]))
         camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
-        self._renderer.update_scene(build_data(self._world, self._scene, poses), camera=camera)
-        _roll(self._renderer.scene, view)
-        return np.array(self._renderer.render())
+        return self._renderer.draw(build_data(self._world, self._scene, poses), camera, partial(_roll, view=view))
 
     def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
         """The pixels that show a part alone."""
