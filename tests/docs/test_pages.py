@@ -37,6 +37,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"sweep ": "minutes: many trials; tests/benchmark/sweeps runs small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --max-pictures 0 runs",
     r"noise fit ": "needs the results of a pose estimator; tests/perception/observation/test_fit.py runs it",
+    r"dataset (make .*--format bop|estimate )": "many images; tests/benchmark/datasets makes small ones",
     r"run .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
     r"run .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
     r"run .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",

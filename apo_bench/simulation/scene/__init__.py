@@ -1,10 +1,12 @@
 """Scenes: the parts of a scenario with human hands or an arm, as compiled MuJoCo models."""
 
+from apo_bench.simulation.scene.clamps import list_clamps, release_clamp, weld_clamp
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
+    build_data,
     build_data_with_arm,
     check_film,
     copy_data,
@@ -48,6 +50,7 @@ __all__ = (
     "World",
     "aim_camera",
     "allow_sleep",
+    "build_data",
     "build_data_with_arm",
     "build_scene",
     "check_film",
@@ -57,11 +60,13 @@ __all__ = (
     "get_part_pose",
     "has_failed",
     "is_unstable",
+    "list_clamps",
     "make_initial_state",
     "move_arm_home",
     "move_part",
     "place_for_picture",
     "project_to_pixels",
+    "release_clamp",
     "save_film",
     "set_part_pose",
     "switch_wrist_sensors_on",
@@ -69,4 +74,5 @@ __all__ = (
     "touches_others",
     "use_timestep",
     "wake",
+    "weld_clamp",
 )

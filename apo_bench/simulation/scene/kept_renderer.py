@@ -1,9 +1,9 @@
 """A renderer that is kept between the pictures of a scene, since making one takes longer than a picture."""
 
 import weakref
+from collections.abc import Callable
 from typing import Any, final
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,29 +14,31 @@ from apo_bench.simulation.graphics import renderer
 class KeptRenderer:
     """Draws pictures of one model, all of the same size."""
 
-    def __init__(self, model: Any, width: int, height: int, shadows: bool = False) -> None:
+    def __init__(self, model: Any, width: int, height: int, shadow_texels: int = 0) -> None:
         """Open a renderer.
 
         Args:
             model: The `mujoco.MjModel`.
             width, height: [pixels].
-            shadows: Whether to draw shadows, which is several times slower without a graphics card.
+            shadow_texels: As of `renderer`; default: no shadows.
 
         Raises:
             InputError: No graphics driver can be used, or the picture is too large.
         """
-        self._renderer = renderer(model, width, height)
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        self._renderer = renderer(model, width, height, shadow_texels)
         self.close = weakref.finalize(self, _release, self._renderer)
         """Frees the renderer; this also happens when the object is deleted."""
 
-    def draw(self, data: Any, camera: Any) -> NDArray[np.uint8]:
+    def draw(self, data: Any, camera: Any, adjust: Callable[[Any], None] | None = None) -> NDArray[np.uint8]:
         """Return a picture of a state (`mujoco.MjData`), (height, width, 3), uint8.
 
         Args:
             camera: The name of a camera, or a `mujoco.MjvCamera`.
+            adjust: A function that changes MuJoCo's abstract scene before it is drawn.
         """
         self._renderer.update_scene(data, camera=camera)
+        if adjust is not None:
+            adjust(self._renderer.scene)
         return np.array(self._renderer.render())
 
 

@@ -14,7 +14,7 @@ from apo_bench.assembly import Poses
 from apo_bench.errors import InputError, missing_package, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.io import write_file
-from apo_bench.simulation.graphics import need_window, renderer
+from apo_bench.simulation.graphics import SHADOW_TEXELS, need_window, renderer
 from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
@@ -44,7 +44,7 @@ def draw_picture(
         camera: `overview`, `close`, `top`, or the result of `aim_camera`.
         more: A function that adds geoms to MuJoCo's abstract scene.
     """
-    return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
+    return _draw(scene.shown, build_data(scene.shown, scene, poses), width, height, camera, more)
 
 
 def picture_with_arm(
@@ -67,7 +67,7 @@ def picture_with_arm(
 
 def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
     """The `mujoco.MjData` of the replay world that `picture_with_arm` shows."""
-    data = _at(scene.work, scene, poses)
+    data = build_data(scene.work, scene, poses)
     move_arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
@@ -154,7 +154,7 @@ class Film:
         self.camera = camera or aim_camera(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         _check_camera(scene.work, self.camera)
-        self._renderer = KeptRenderer(scene.work.model, width, height, shadows)
+        self._renderer = KeptRenderer(scene.work.model, width, height, SHADOW_TEXELS if shadows else 0)
         self._every = speed / fps
         self._next = 0.0
 
@@ -270,7 +270,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
         require_known("camera", camera, names, rest=" Or give the result of aim_camera.")
 
 
-def _at(world: World, scene: Scene, poses: Poses) -> Any:
+def build_data(world: World, scene: Scene, poses: Poses) -> Any:
     """A new state of a world with parts at `poses`, and parts that are not named at their starts."""
     data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
