@@ -10,20 +10,18 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import array_shapes, arrays
 from msgspec.structs import replace
 
 from apo_bench import InputError, TrialConfig, load_scenario
 from apo_bench.benchmark.datasets.images import make as made
 from apo_bench.benchmark.datasets.images.estimate import estimate_poses
 from apo_bench.benchmark.datasets.images.models import ImageObject, describe_model, make_model, measure_diameter
-from apo_bench.benchmark.datasets.images.scene import add_depth_noise, decode_mask, encode_mask
+from apo_bench.benchmark.datasets.images.scene import add_depth_noise
 from apo_bench.benchmark.datasets.images.views import draw_views
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_description
 from apo_bench.formats.bop_models import read_symmetries
+from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import collect_corners, pose, shrink_pieces
 from apo_bench.io import convert_typed
 from apo_bench.records import SecretSeed
@@ -225,14 +223,6 @@ def test_depth_noise_grows_with_the_squared_depth() -> None:
     assert np.mean(near == 0.0) == pytest.approx(0.01, rel=0.2)
     exact = add_depth_noise(np.array([[1.0, np.inf]]), 0.0, rng)
     assert np.array_equal(exact, [[1.0, 0.0]])
-
-
-@given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=12), elements=st.booleans()))
-def test_masks_come_back(mask: Any) -> None:
-    encoded = encode_mask(mask)
-    assert np.array_equal(decode_mask(encoded), mask)
-    assert sum(encoded["counts"]) == mask.size
-    assert all(encoded["counts"][1:])
 
 
 def test_the_estimator_finds_parts_in_exact_depth(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.benchmark.datasets.images.make import JOINED_DETECTIONS
-from apo_bench.benchmark.datasets.images.scene import decode_mask
 from apo_bench.errors import require
 from apo_bench.formats.bop import EstimatedPose, write_results
 from apo_bench.formats.bop_images import PublishedCamera, SceneEntry, read_cameras, read_description
+from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import Array, find_symmetries, pose, shrink_pieces
 from apo_bench.io import group_by, read_plain
 from apo_bench.perception.depth_camera.model_localisation import Appearance, Model, locate_model
