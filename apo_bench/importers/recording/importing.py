@@ -29,8 +29,6 @@ from apo_bench.perception.observation.models import (
 )
 from apo_bench.scenario import Scenario, place_layout
 
-_MANY = 0.25  # share of gross frames of a part that is doubtful
-
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -124,12 +122,7 @@ def import_recording(
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
     wrong = {part: int(each.sum()) for part, each in gross.items()}
-    many = tuple(
-        f"{n} of {len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
-        for part, n in wrong.items()
-        if n > _MANY * len(tracks[part].t)
-    )
-    doubts = (*other, *many, *list_doubts(followed, intervals, arrangement, covariance, assembly))
+    doubts = (*other, *list_doubts(followed, wrong, arrangement, covariance, assembly))
     return ImportedRecording(
         scenario, observation, arrangement, operations, covariance, followed, turned, wrong, doubts
     )

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, final
 
+import numpy as np
+
 from apo_bench.errors import require
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array
 from apo_bench.importers.recording.camera_file import NamedEntries
 from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
@@ -76,7 +78,7 @@ def _read_part(value: Any, place: str) -> TrackedPart:
         if stated.frame is not None:
             frames[own[0]] = stated.frame.matrix(f"{place}, frame")
     require(len(ids) == len({*ids}) and ids, f"{place}: an id stands twice, or none is given.")
-    return TrackedPart(tuple(ids), frames.pop(ids[0], pose.at((0.0, 0.0, 0.0))), frames)
+    return TrackedPart(tuple(ids), frames.pop(ids[0], np.eye(4)), frames)
 
 
 def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
@@ -91,10 +93,9 @@ def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
         if name in parts or not of:
             parts.setdefault(name, tracked)
             continue
-        part = max(of, key=len)
-        ids = (*parts[part].ids, *tracked.ids)
-        stated = (
-            {} if (tracked.T_model_part == pose.at((0.0, 0.0, 0.0))).all() else {tracked.ids[0]: tracked.T_model_part}
-        )
-        parts[part] = TrackedPart(ids, parts[part].T_model_part, {**parts[part].others, **stated, **tracked.others})
+        first = parts[max(of, key=len)]
+        is_stated = not (tracked.T_model_part == np.eye(4)).all()
+        stated = {tracked.ids[0]: tracked.T_model_part} if is_stated else {}
+        others = {**first.others, **stated, **tracked.others}
+        parts[max(of, key=len)] = TrackedPart((*first.ids, *tracked.ids), first.T_model_part, others)
     return ObjectsFile(objects.file, parts, objects.ignored)

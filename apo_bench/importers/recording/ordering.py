@@ -183,7 +183,9 @@ def _lengthen(
     )
     for interval in known[first:] if k not in unseen else ():
         ended = _ended(choice.intervals)
-        if interval.begins > ended and time_taken(intervals, choice.intervals, interval) + _OVERLAP_S >= ended:
+        # A part that was hidden may have been put down and taken again meanwhile.
+        taken = ended if interval.rests[0].hidden else time_taken(intervals, choice.intervals, interval)
+        if interval.begins > ended and taken + _OVERLAP_S >= ended:
             chosen = (*choice.intervals, interval)
             unexplained = _count_unexplained(choice.intervals, _ended(chosen), assembly, intervals)
             yield _Choice(choice.worth + worth(k, interval), choice.unexplained + unexplained, chosen)
@@ -230,6 +232,11 @@ def _ended(chosen: Chosen) -> float:
 
 def _explain_order(assembly: Assembly, intervals: RestIntervals, k: int) -> NoMatchingOrder:
     """Return an error that names the operation for which no interval is left."""
+    if all(len(known) == 1 for known in intervals.values()):
+        return NoMatchingOrder(
+            "no part comes to rest at another place than before, so the log shows no operation; give a log that goes "
+            "on until the part of the first operation has rested for 0.3 s."
+        )
     part = assembly.operations[k].main
     rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[part])
     return NoMatchingOrder(

@@ -33,6 +33,7 @@ OVER = MODEL @ pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0)) @ pose.inverse(MODEL)
 """A half turn of the stick about an axis of its symmetry, in the frame of the tracker's model."""
 TAG = pose.at((0.0, 0.0, -0.04), (180.0, 0.0, 0.0))
 """Where a second tag is on the stick, in the frame of the first."""
+DEVIATIONS = (0.4831, 1.495, 0.6494)
 Rows = list[tuple[float, str, Array]]
 
 
@@ -242,6 +243,16 @@ def imported(path: Path, parts: Mapping[str, TrackedPart] = PARTS) -> ImportedRe
 @cache
 def whole() -> ImportedRecording:
     return imported(ROOT / "docs" / "recording.csv")
+
+
+def test_the_recording_of_the_guide_gives_what_it_gave() -> None:
+    """Positions in mm, and the standard deviations of x in mm: castle2 was moved by 1.4 mm when the stick came in."""
+    found = whole().observation
+    wanted = [[86.899847, -31.642610, 0.034543], [88.309970, -33.795005, 79.913877], [82.692679, -32.838378, 39.826257]]
+    np.testing.assert_allclose(1e3 * found.poses[:, :3, 3], wanted, atol=1e-5)  # other kernels round otherwise
+    np.testing.assert_allclose(
+        np.sqrt(np.trace(whole().covariance[:, :3, :3], axis1=1, axis2=2) / 3.0) * 1e3, DEVIATIONS, rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize("name", [*TEXTS, *FOLDERS])
