@@ -72,8 +72,7 @@ class PoseResults:
         for number, scene in self.description.scenes.items():
             if (scene.scenario, scene.seed, scene.clearance_mm, drawn) == key:
                 folder = self.folder / self.description.split / f"{int(number):06d}"
-                cameras = read_cameras(folder) if folder.is_dir() else {}  # a failed demonstration has no images
-                return TrialResults(self, int(number), scene, cameras, turns)
+                return TrialResults(self, int(number), scene, read_cameras(folder), turns)
         seeds = sorted(scene.seed for scene in self.description.scenes.values() if scene.scenario == key.scenario)
         shown = f"seeds {seeds[0]} to {seeds[-1]}" if seeds else "none"
         raise InputError(
