@@ -99,7 +99,7 @@ def describe_misses(residuals: Residuals) -> str:
     found = residuals.is_estimated
     outliers = 1.0 - residuals.is_inlier.sum() / found.sum()
     return (
-        f"Of {len(found)} parts, {100.0 * (1.0 - found.mean()):.0f} % have no estimate, those outside of the image "
+        f"Of {len(found)} parts, {100.0 * (1.0 - found.mean()):.1f} % have no estimate, those outside of the image "
         f"included; {100.0 * outliers:.1f} % of the estimates are more than 50 mm off."
     )
 
@@ -131,7 +131,7 @@ def write_page(rows: dict[float, list[dict[str, float | str]]], residuals: dict[
         "## Errors",
         "",
         "Percentiles of the errors of upright estimates within 50 mm, next to those of MegaPose on T-LESS",
-        "(`megapose-tless`), which are of photographs, and of colours alone:",
+        "(`megapose-tless`), which are of photographs:",
         "",
         *table(
             ("`icp` / MegaPose on T-LESS", *(f"{p} %" for p in PERCENTILES)), list_errors(residuals[max(residuals)])
