@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import TrialConfig, load_scenario
-from apo_bench.benchmark.datasets.images.estimate import estimate_poses
+from apo_bench.benchmark.datasets.images.estimate import estimate_images
 from apo_bench.benchmark.datasets.images.make import make_images
 from apo_bench.benchmark.scoring.images import score_poses
 from apo_bench.formats.bop import read_results
@@ -56,7 +56,7 @@ def make_split(folder: Path, split: str, trials: int, human_error_scale: float) 
     results = images / "icp.csv"
     if not results.exists():
         start = time.process_time()
-        made = estimate_poses(images, results)
+        made = estimate_images(images, results)
         print(f"{made} estimates in {time.process_time() - start:.0f} s of processor time", flush=True)
     return results
 
