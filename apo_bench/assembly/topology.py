@@ -74,6 +74,8 @@ class Operation:
     main: str
     contacts: tuple[Contact, ...] = ()
     carries: tuple[str, ...] = ()
+    clamped: bool = False
+    """Whether the main part is fixed to what it touches once it is in place, as by screws that no operation drives."""
 
     @property
     def moves(self) -> tuple[str, ...]:

@@ -1,11 +1,22 @@
 """The command `apo-bench assembly import`: CAD files become a scenario."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from apo_bench.cli.scenario import ClearanceMm, Fixed, MaxOverlapMm, Order, Overwrite, Up, write_new_scenario
+from apo_bench.cli.part import Density
+from apo_bench.cli.scenario import (
+    ClearanceMm,
+    Fits,
+    Fixed,
+    MaxOverlapMm,
+    Order,
+    Overwrite,
+    Up,
+    parse_names,
+    write_new_scenario,
+)
 from apo_bench.cli.shared import Command, check_output, make_group, make_path_option, parse_path
 
 _HELP = """
@@ -35,7 +46,16 @@ def assembly_import(
     fixed: Fixed = None,
     order: Order = None,
     clearance_mm: ClearanceMm = 0.25,
-    max_overlap_mm: MaxOverlapMm = 0.2,
+    max_overlap_mm: MaxOverlapMm = 1.0,
+    fits: Fits = "auto",
+    fasteners: Annotated[
+        Literal["clamp", "parts"],
+        typer.Option(
+            help="clamp leaves screws and nuts out and fixes what only they hold; parts treats them as parts."
+        ),
+    ] = "clamp",
+    density: Density = 1000.0,
+    skip: Annotated[list[str] | None, typer.Option(help="Name of a solid to leave out; may be repeated.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Make a scenario from CAD files: parts, contacts, an order, starts and grasps.
@@ -44,11 +64,23 @@ def assembly_import(
       apo-bench assembly import jig.step --out jig.toml
       apo-bench assembly import base.step key.step pin.step --order key,pin --out clamp.toml
     """
+    from apo_bench.importers.assembly.choices import AssemblyChoices
     from apo_bench.importers.assembly.from_cad import import_parts, remove_on_failure
 
     check_output(out, "--out", ".toml", new=not overwrite)
+    choices = AssemblyChoices(
+        up,
+        tuple(fixed or ()),
+        parse_names(order),
+        clearance_mm,
+        max_overlap_mm,
+        fits,
+        fasteners,
+        density,
+        tuple(skip or ()),
+    )
     with remove_on_failure(out.with_name(f"{out.stem}_parts")) as folder:
-        poses, lines = import_parts(files, folder, unit)
-        typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
+        poses, _ = import_parts(files, folder, unit, choices, typer.echo)
+        typer.echo(f"Wrote {poses} and its parts")
         source = ", ".join(file.name for file in files)
-        write_new_scenario(poses, [], source, out, (up, fixed, order, clearance_mm, max_overlap_mm))
+        write_new_scenario(poses, [], source, out, choices)

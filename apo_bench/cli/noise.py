@@ -41,7 +41,7 @@ def noise_list() -> None:
     from apo_bench.viz.noise_sheet import list_models
 
     print_columns(list(list_models().items()))
-    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, or package.module:name")
+    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, poses:FILE.csv, or package.module:name")
 
 
 @commands.command("show", cls=Command)
@@ -90,7 +90,9 @@ def noise_fit(
     out: Annotated[Path | None, make_path_option("Write the noise file for --noise: .toml.")] = None,
     residuals: Annotated[Path | None, make_path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
     picture: Annotated[Path | None, make_path_option("Draw observed and fitted distributions: .png.")] = None,
-    source: Annotated[str | None, typer.Option(help="Source to name in the noise file; default: the files.")] = None,
+    source_name: Annotated[
+        str | None, typer.Option(help="Source to name in the noise file; default: the files.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Fit a noise model to a pose estimator: tails across and along the ray, outliers and misses.
@@ -117,7 +119,7 @@ def noise_fit(
     known = models or find_models_info(truth)
     symmetries = {**({} if known is None else read_symmetries(known)), **_find_own_symmetries(scenario, objects)}
     matched = match_residuals(results, read_truth(truth, results, scene_id), symmetries)
-    fitted = fit_noise(matched, _clean_line(source or f"{estimates.name} against {truth.name}"))
+    fitted = fit_noise(matched, _clean_line(source_name or f"{estimates.name} against {truth.name}"))
     form = make_fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:
         command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"

@@ -29,6 +29,7 @@ Examples:
   apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
 """
 commands = make_group("part", _HELP)
+Density = Annotated[float, typer.Option(min=1.0, max=25_000.0, help="Density in kg/m^3.")]
 
 
 @commands.command("import", cls=Command)
@@ -39,7 +40,7 @@ def part_import(
         str | None, typer.Option(help="Unit of the file: mm, in, m, cm, ft or um; default: as the file states.")
     ] = None,
     name: Annotated[list[str] | None, typer.Option(help="Rename a face, such as hole1=bore; may be repeated.")] = None,
-    density: Annotated[float, typer.Option(min=1.0, max=25_000.0, help="Density in kg/m^3.")] = 1000.0,
+    density: Density = 1000.0,
     round_sides: Annotated[
         int,
         typer.Option(
@@ -118,7 +119,7 @@ def _import_solids(
     file: Path, solids: Sequence[Any], out: Path, density: float, as_json: bool
 ) -> tuple[list[Any], list[str]]:
     """Parts with their pictures, and the reasons why other solids became none."""
-    from apo_bench.importers.cad.part_import import import_solid
+    from apo_bench.importers.cad.fallback import import_solid_anyway
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import format_part_report, report_part
     from apo_bench.importers.cad.solids.naming import clean_title, make_part_name
@@ -130,7 +131,7 @@ def _import_solids(
         stem = make_part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
         used.add(stem)
         try:
-            part = import_solid(raw, stem, out, file.name, density)
+            part = import_solid_anyway(raw, stem, out, file.name, density)
         except InputError as error:
             if len(solids) == 1:
                 raise

@@ -2,7 +2,7 @@
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,6 +17,9 @@ from apo_bench.cli.shared import (
     print_columns,
 )
 from apo_bench.records import SETTINGS, check
+
+if TYPE_CHECKING:
+    from apo_bench.importers.assembly.choices import AssemblyChoices
 
 _HELP = """
 Scenarios: the tasks that human and robot do.
@@ -36,9 +39,13 @@ Fixed = Annotated[
 ]
 Order = Annotated[str | None, typer.Option(help="Order of the parts, with commas; default: an order that works.")]
 ClearanceMm = Annotated[float, typer.Option(min=0.0, max=5.0, help="Clearance per side of faces that fit, mm.")]
+Fits = Annotated[
+    Literal["auto", "ask", "refuse"],
+    typer.Option(help="Parts drawn without play: auto gives them the clearance, ask lists them, refuse keeps them."),
+]
 MaxOverlapMm = Annotated[
     float,
-    typer.Option(min=0.0, max=1.0, help="Add the clearance where parts overlap by up to this depth, mm; 0: nowhere."),
+    typer.Option(min=0.0, max=1.0, help="Add the clearance where parts overlap by up to this depth, mm."),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace --out and its parts.")]
 
@@ -89,7 +96,8 @@ def scenario_new(
     fixed: Fixed = None,
     order: Order = None,
     clearance_mm: ClearanceMm = 0.25,
-    max_overlap_mm: MaxOverlapMm = 0.2,
+    max_overlap_mm: MaxOverlapMm = 1.0,
+    fits: Fits = "auto",
     overwrite: Overwrite = False,
 ) -> None:
     """Make a scenario from parts at their final poses: contacts, an order, starts and grasps, each with a comment.
@@ -98,40 +106,30 @@ def scenario_new(
       apo-bench scenario new --poses poses.toml --out pile.toml
       apo-bench scenario new block stick --poses poses.toml --fixed lower --out pile.toml
     """
+    from apo_bench.importers.assembly.choices import AssemblyChoices
+
     check_output(out, "--out", ".toml", new=not overwrite)
-    write_new_scenario(poses, parts or [], poses.name, out, (up, fixed, order, clearance_mm, max_overlap_mm))
+    names = parse_names(order)
+    choices = AssemblyChoices(up, tuple(fixed or ()), names, clearance_mm, max_overlap_mm, fits)
+    write_new_scenario(poses, parts or [], poses.name, out, choices)
 
 
-def write_new_scenario(
-    poses: Path,
-    parts: list[str],
-    source: str,
-    out: Path,
-    choices: tuple[str | None, list[str] | None, str | None, float, float],
-) -> None:
+def parse_names(text: str | None) -> tuple[str, ...]:
+    """Return the names in a list with commas."""
+    return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
+def write_new_scenario(poses: Path, parts: list[str], source: str, out: Path, choices: "AssemblyChoices") -> None:
     """Choose what poses leave open, and write the scenario file.
 
     Args:
         source: Name of what the poses come from.
-        choices: Values of --up, --fixed, --order, --clearance-mm and --max-overlap-mm.
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
     from apo_bench.importers.assembly.scenario_writer import list_choices
 
-    up, fixed, order, clearance_mm, max_overlap_mm = choices
-    names = [name.strip() for name in order.split(",")] if order else []
-    made = scenario_from_poses(
-        poses,
-        parts,
-        out,
-        source,
-        up=up,
-        fixed=fixed or (),
-        order=names,
-        clearance_mm=clearance_mm,
-        max_overlap_mm=max_overlap_mm,
-    )
+    made = scenario_from_poses(poses, parts, out, source, choices)
     typer.echo("\n".join(list_choices(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; next: apo-bench scenario check {shlex.quote(str(out))}")

@@ -7,6 +7,7 @@ from apo_bench.geometry.arrays import Array, remember
 from apo_bench.geometry.hull import Hull, make_cylinder_hull
 from apo_bench.geometry.polygon import find_plane_across, make_flat_area
 from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.shoulders import list_shoulder_planes
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
 _ON_SURFACE_M = 1e-7
@@ -109,10 +110,12 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     if hull.cylinder is not None:
         return _recede_cylinder(solid, hull, clearance_m)
     on = [i for i, side in enumerate(hull.planes) if _lies_on_fit_face(solid, hull, side)]
-    if not on:
+    beyond = list_shoulder_planes(solid, hull, clearance_m)
+    if not on and not beyond:
         return hull
     planes = np.array(hull.planes)
     planes[on, 3] -= clearance_m
+    planes = np.array([*planes, *beyond])
     # Intersecting half spaces needs an interior point: the mean of the corners, else the centre of the largest ball.
     inside = hull.corners.mean(axis=0)
     if (planes[:, 3] - planes[:, :3] @ inside).min() < _THINNEST_M:

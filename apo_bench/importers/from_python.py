@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
@@ -30,7 +31,8 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
         >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
         ['plate.xml']
     """
-    from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
+    from apo_bench.importers.cad.fallback import import_solid_anyway
+    from apo_bench.importers.cad.part_import import read_raw_solids
     from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
@@ -38,7 +40,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
     written: dict[str, Path] = {}
     for raw in read_raw_solids(source, unit)[1]:
         name = make_part_name(raw.name, set(written))
-        written[name] = import_solid(raw, name, target, source.name).path
+        written[name] = import_solid_anyway(raw, name, target, source.name).path
     return tuple(written.values())
 
 
@@ -52,7 +54,11 @@ def import_assembly(
     fixed: Sequence[str] = (),
     order: Sequence[str] = (),
     clearance_mm: float = 0.25,
-    max_overlap_mm: float = 0.2,
+    max_overlap_mm: float = 1.0,
+    fits: Literal["auto", "ask", "refuse"] = "auto",
+    fasteners: Literal["clamp", "parts"] = "clamp",
+    density: float = 1000.0,
+    skip: Sequence[str] = (),
 ) -> Scenario:
     """Make a scenario from CAD files: parts, contacts, an order, starts and grasps.
 
@@ -65,13 +71,19 @@ def import_assembly(
         fixed: Parts that stay where they are. Default: the largest of the lowest.
         order: The moved parts in their order. Default: one that is found.
         clearance_mm: Clearance per side between parts that fit.
-        max_overlap_mm: Largest depth to which parts may overlap in the files.
+        max_overlap_mm: Largest depth by which faces recede where parts overlap in the files.
+        fits: `auto` gives parts that overlap or were drawn without play the clearance; `ask` lists them as an error;
+            `refuse` changes nothing.
+        fasteners: `clamp` leaves screws, nuts, washers and inserts out, and fixes a part that only they hold where it
+            is placed; `parts` treats them as parts.
+        density: Density of all parts, [kg/m^3].
+        skip: Names of solids to leave out.
 
     Returns:
         The scenario; its file can be edited, and `load_scenario` reads it again.
 
     Raises:
-        InputError: A file cannot be read, a solid makes no part, or the scenario file exists.
+        InputError: A file cannot be read, fewer than two solids make parts, or the scenario file exists.
         RuntimeError: There is no order in which the parts can be assembled.
 
     Examples:
@@ -84,6 +96,7 @@ def import_assembly(
         >>> [operation.main for operation in scenario.assembly.operations]
         ['block']
     """
+    from apo_bench.importers.assembly.choices import AssemblyChoices, check_density
     from apo_bench.importers.assembly.from_cad import import_parts, remove_on_failure
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
 
@@ -92,19 +105,13 @@ def import_assembly(
     target = Path(f"{sources[0].stem}.toml") if out is None else Path(out)
     require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
     require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
+    check_density(density)
+    choices = AssemblyChoices(
+        up, tuple(fixed), tuple(order), clearance_mm, max_overlap_mm, fits, fasteners, density, tuple(skip)
+    )
     with remove_on_failure(target.with_name(f"{target.stem}_parts")) as folder:
-        poses, _ = import_parts(sources, folder, unit)
-        scenario_from_poses(
-            poses,
-            (),
-            target,
-            ", ".join(source.name for source in sources),
-            up=up,
-            fixed=fixed,
-            order=order,
-            clearance_mm=clearance_mm,
-            max_overlap_mm=max_overlap_mm,
-        )
+        poses, _ = import_parts(sources, folder, unit, choices)
+        scenario_from_poses(poses, (), target, ", ".join(source.name for source in sources), choices)
     return load_scenario(target)
 
 

@@ -133,7 +133,7 @@ def _read_operation(
     gaps = read_contacts(table.contacts, place, (main, *table.carries), solids, there)
     varies = table.vary if isinstance(table.vary, tuple) else (table.vary,)
     return OperationEntry(
-        operation=Operation(main, tuple(gaps), table.carries),
+        operation=Operation(main, tuple(gaps), table.carries, table.clamp),
         gaps=gaps,
         goal=table.goal.matrix,
         attach=_read_attach(table.attach, f"{place}, attach"),

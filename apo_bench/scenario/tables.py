@@ -79,6 +79,7 @@ class OperationTable(FileTable, frozen=True, kw_only=True):
     attach: AttachTable = AttachTable()
     grasp: GraspTable = GraspTable()
     vary: VaryTable | tuple[VaryTable, ...] = ()
+    clamp: bool = False
 
 
 class SiteTable(FileTable, frozen=True, kw_only=True):

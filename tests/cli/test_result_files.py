@@ -23,13 +23,13 @@ ROOT = Path(__file__).parent.parent.parent
 LOG = f"{ROOT}/docs/recording.csv --format csv --camera camera.toml"
 COMMANDS = {
     "inspect graph stick_in_tower --out graph.svg": "graph.svg",
-    f"inspect plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
+    f"inspect plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot-plan robot.json": "robot.json",
     "arm check six_axis block_on_block --layouts 1 --out arm.png": "arm.png",
     "noise fit --estimates estimates.csv --truth truth.csv --out fit.toml --residuals fit.csv --picture fit.png": (
         "fit.toml fit.csv fit.png"
     ),
     f"recording import {LOG} --objects objects.toml --scenario stick_in_tower --out seen.json --picture seen.png "
-    "--paths seen_paths.csv": "seen.json seen.png seen_paths.csv",
+    "--paths-out seen_paths.csv": "seen.json seen.png seen_paths.csv",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
     "run block_on_block --save-observation saved.json --video film.gif --fidelity near-contact": "saved.json film.gif",
     "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",

@@ -12,6 +12,8 @@ from apo_bench import InputError
 from apo_bench.geometry import Face, Hull, Solid, shrink_pieces
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.box_union import SIDES, unite
+from apo_bench.scenario.parts.fit_faces import mark_fit_faces
+from apo_bench.scenario.parts.making import bore, build_solid, extrude, make_rectangle, make_shaft
 
 
 @pytest.mark.parametrize("clearance_mm", [0.25])
@@ -64,3 +66,30 @@ def test_a_piece_that_is_hardly_any_of_a_part_recedes_to_nothing():
     assert [piece.name for piece in shrink_pieces(layered(1.5e-4), 2e-5)] == ["thick", "thin"]
     with pytest.raises(InputError, match=r"leaves less than 0\.1 mm of piece 'thin' of part 'cube'"):
         shrink_pieces(layered(2.5e-4), 2.5e-4)
+
+
+@pytest.mark.parametrize("clearance_mm", [0.1, 0.25, 1.2])
+def test_chamfers_of_a_fit_shaft_stay_out_of_its_play(clearance_mm: float):
+    """Also a chamfer that is smaller than the clearance."""
+    chamfered = build_solid("pin", make_shaft(4, 0, 30, "side", chamfer_low=1, chamfer_high=1))
+    pin = mark_fit_faces(chamfered, {"side": 0.0})
+    thinner = 4.0 - clearance_mm
+    for nominal, piece in zip(pin.pieces, shrink_pieces(pin, 1e-3 * clearance_mm), strict=True):
+        distance = 1e3 * np.hypot(*piece.corners[:, :2].T)
+        assert distance.max() < thinner + 1e-6
+        assert np.ptp(piece.corners[:, 2]) == pytest.approx(np.ptp(nominal.corners[:, 2]), abs=1e-9)
+        # The cone itself does not recede: the tip is as wide as before where it is thinner than the shaft.
+        if distance.max() > 3.0 and np.ptp(nominal.corners[:, 2]) < 2e-3:
+            assert distance.min() == pytest.approx(min(3.0, thinner), rel=0.02)
+
+
+def test_a_countersink_of_a_fit_hole_widens_with_it():
+    step = bore((0, 0), 4, 0, 20, "bore", chamfer_high=1, fit=True)
+    plate = build_solid("plate", extrude(make_rectangle(40, 40), 0, 20, bores=[step]))
+    pieces = shrink_pieces(plate, 2.5e-4)
+    angle = np.linspace(0.0, 2.0 * np.pi, 90)
+    for height, free in ((0.01, 4.25), (0.0191, 4.25), (0.0199, 4.9)):
+        for radius, inside in ((free - 0.01, False), (free + 0.2, True)):
+            at = np.column_stack([1e-3 * radius * np.cos(angle), 1e-3 * radius * np.sin(angle), np.full(90, height)])
+            depth = [(piece.planes[:, 3] - at @ piece.planes[:, :3].T).min(axis=1) for piece in pieces]
+            assert (np.max(depth, axis=0) > 0.0).all() == inside, (height, radius)

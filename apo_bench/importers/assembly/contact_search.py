@@ -4,7 +4,7 @@ Poses of a file and fitted faces are rounded, so faces within 0.05 mm count as t
 ones move by the least amount that closes every contact.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations, product
 
 import numpy as np
@@ -17,10 +17,9 @@ from apo_bench.assembly import (
     Poses,
     classify_contact,
     compute_geometric_play,
-    compute_play_mm,
 )
 from apo_bench.assembly.facing_pairs import find_facing_pairs
-from apo_bench.geometry import Array, Solid, measure_intrusion, measure_mate, pose
+from apo_bench.geometry import Array, RoundFace, Solid, measure_intrusion, measure_mate, pose
 from apo_bench.scenario.layout_checks import DEEP_M
 
 NEAR_M = 5e-5  # largest gap of a contact at the given poses
@@ -115,18 +114,26 @@ def _find_tight_fit(
         deep_m: Depth of the overlap of the two parts; a shaft thicker than its hole by more than this ends before it.
     """
     a, b = pair
-    for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
-        play = compute_play_mm(wall, other, clearance_mm) if classify_contact(wall, other) == "shaft in hole" else None
-        if play is None or play > NO_PLAY_MM or compute_geometric_play(wall, other) < -min(_THREAD_M, deep_m + NEAR_M):
-            continue
-        fit = measure_mate(wall, poses[a], other, poses[b])
-        if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
+    for wall, other, play_m in find_coaxial_pairs(solids[a], poses[a], solids[b], poses[b]):
+        play_mm = 1e3 * play_m + clearance_mm * (wall.fit or other.fit)
+        if play_mm <= NO_PLAY_MM and play_m >= -min(_THREAD_M, deep_m + NEAR_M):
             return (
                 f"'{a}.{wall.name}' and '{b}.{other.name}' have radii of {1e3 * wall.radius:.4g} and "
-                f"{1e3 * other.radius:.4g} mm: a press fit or a thread, which no trial makes; make the hole wider, or "
-                "state fit = true for its face in its part file"
+                f"{1e3 * other.radius:.4g} mm: a press fit or a thread, which no trial makes; leave the screw out, "
+                f"allow an overlap of {-1e3 * play_m:.2g} mm, or make the hole wider"
             )
     return ""
+
+
+def find_coaxial_pairs(a: Solid, T_a: Array, b: Solid, T_b: Array) -> Iterator[tuple[RoundFace, RoundFace, float]]:
+    """Yield each shaft of one solid on the axis of a hole of the other, face of `a` first, and the radius of the hole
+    minus that of the shaft, [m]."""
+    for wall, other in product(a.rounds.values(), b.rounds.values()):
+        if classify_contact(wall, other) != "shaft in hole":
+            continue
+        fit = measure_mate(wall, T_a, other, T_b)
+        if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
+            yield wall, other, compute_geometric_play(wall, other)
 
 
 def _solve_poses(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:

@@ -1,17 +1,20 @@
 """Import the parts of an assembly from CAD files with one common frame, with the pose of every copy."""
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from apo_bench.errors import require
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, pose
+from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
+from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
+from apo_bench.importers.cad.fallback import import_solid_anyway
 from apo_bench.importers.cad.near_points import find_near_points
-from apo_bench.importers.cad.part_import import import_solid, read_raw_solids
+from apo_bench.importers.cad.part_import import read_raw_solids
 from apo_bench.importers.cad.pose_file import name_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
@@ -32,46 +35,114 @@ def remove_on_failure(folder: Path) -> Iterator[Path]:
         raise
 
 
-def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+def import_parts(
+    files: Sequence[Path],
+    folder: Path,
+    unit: str | None = None,
+    choices: AssemblyChoices = DEFAULT_CHOICES,
+    report: Callable[[str], object] = bool,
+) -> tuple[Path, tuple[str, ...]]:
     """Write the parts of an assembly, each shape of a file once, and the place of every copy.
 
     The frame of a part is at its foot, wherever the file has its origin: a small error of an observed rotation then
-    turns the part about its own frame.
+    turns the part about its own frame. A solid that makes no part is left out.
 
     Args:
         files: One file of several solids, or several files with one common frame.
         unit: Unit of the files; None: as they state.
+        report: Gets each line of the report as soon as it is known.
 
     Returns:
-        The file of poses, and a sentence for each part, warning, and face that can make no contact.
+        The file of poses, and a sentence for each part, warning, face that can make no contact, and solid left out.
 
     Raises:
-        InputError: A file cannot be read, a solid makes no part, or there is one alone.
+        InputError: A file cannot be read, or fewer than two solids make parts.
     """
-    lines: list[str] = []
-    found: list[tuple[str, RawSolid]] = []
-    for file in files:
-        source, solids = read_raw_solids(file, unit)
-        left_out = source.left_out
-        require(not left_out, f"{file}: {len(left_out)} of its solids can be no parts: {' '.join(left_out)}")
-        lines += (f"{file.name}: {warning}" for warning in source.warnings)
-        found += [(file.name, raw) for raw in solids]
+    lines = _Report(report)
+    found = list(_read_solids(files, unit, lines))
+    kept, held = _leave_out_fasteners(_skip_solids(found, choices.skip, lines), choices.fasteners, lines)
     require(
-        sum(len(raw.places) for _, raw in found) > 1,
+        sum(len(raw.places) for _, raw in kept) > 1,
         f"{files[0]}: the file holds one solid; give a file of at least two, or further files.",
     )
     folder.mkdir(parents=True, exist_ok=True)
     places: dict[str, list[SolidPlace]] = {}
-    for (file_name, raw), others in zip(found, find_near_points([raw for _, raw in found]), strict=True):
+    for i, ((file, raw), others) in enumerate(zip(kept, find_near_points([raw for _, raw in kept]), strict=True)):
         name = make_part_name(raw.name, places)
         foot = _find_foot(raw)
         title = clean_title(raw.name)
-        part = import_solid(_shift_solid(raw, -foot), name, folder, f"{file_name}, {title}", others=others - foot)
-        places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
+        source = f"{file}, {title}"
+        try:
+            part = import_solid_anyway(_shift_solid(raw, -foot), name, folder, source, choices.density, others - foot)
+        except InputError as error:
+            lines.add(f"{title} is left out: {str(error).removeprefix(f'{source}: ')}")
+            continue
+        places[name] = [
+            place._replace(T=place.T @ pose.at(foot), held=(i, k) in held) for k, place in enumerate(raw.places)
+        ]
         called = f" ({title})" if raw.name != name else ""
-        lines.append(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
-        lines += (f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items())
-    return write_places(name_places(places), folder, ", ".join(file.name for file in files)), tuple(lines)
+        lines.add(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
+        for repair in part.raw.repairs:
+            lines.add(f"{name}: {repair}")
+        for face, why in part.refused.items():
+            lines.add(f"{name}.{face} can make no contact: {why}")
+    copies = name_places(places)
+    require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
+    return write_places(copies, folder, ", ".join(file.name for file in files)), tuple(lines.lines)
+
+
+class _Report:
+    """The lines of a report, each also passed on as soon as it is added."""
+
+    def __init__(self, report: Callable[[str], object]) -> None:
+        self.lines: list[str] = []
+        self._report = report
+
+    def add(self, line: str) -> None:
+        self.lines.append(line)
+        self._report(line)
+
+
+_Found = list[tuple[str, RawSolid]]
+"""Solids, each with the name of its file."""
+
+
+def _read_solids(files: Sequence[Path], unit: str | None, lines: _Report) -> Iterator[tuple[str, RawSolid]]:
+    """Yield the solids of the files; those that cannot be read are reported."""
+    for file in files:
+        source, solids = read_raw_solids(file, unit, lenient=True)
+        for warning in (*source.warnings, *(f"left out: {reason}" for reason in source.left_out)):
+            lines.add(f"{file.name}: {warning}")
+        yield from ((file.name, raw) for raw in solids)
+
+
+def _skip_solids(found: _Found, skip: Sequence[str], lines: _Report) -> _Found:
+    """Return the solids whose names a user did not ask to leave out."""
+    names = [make_part_name(raw.name, ()) for _, raw in found]
+    for name in skip:
+        require_known("part", name, {*names, *(raw.name for _, raw in found)}, place="skip")
+    kept = [each for each, name in zip(found, names, strict=True) if not {name, each[1].name} & {*skip}]
+    for _, raw in found:
+        if all(raw is not other for _, other in kept):
+            lines.add(f"{clean_title(raw.name)} is left out, as asked")
+    return kept
+
+
+def _leave_out_fasteners(found: _Found, choice: str, lines: _Report) -> tuple[_Found, set[tuple[int, int]]]:
+    """Return the solids that are no fasteners, and the copies that fasteners hold, by index of solid and of place."""
+    fasteners = find_fasteners([raw for _, raw in found]) if choice == "clamp" else {}
+    kept = [each for i, each in enumerate(found) if i not in fasteners]
+    for raw, why in fasteners.values():
+        copies = f", {len(raw.places)} copies" if len(raw.places) > 1 else ""
+        lines.add(f"{clean_title(raw.name)}{copies}: a fastener ({why}); what it holds is clamped where it is placed")
+    if choice != "clamp":
+        return kept, set()
+    parts = [raw for _, raw in kept]
+    not_drawn = list_places_with_screw_holes(parts)
+    if not_drawn:
+        names = ", ".join(sorted({clean_title(parts[i].name) for i, _ in not_drawn}))
+        lines.add(f"{names}: holes continue each other, so screws belong there; a part that only they hold is clamped")
+    return kept, list_held_places(parts, [raw for raw, _ in fasteners.values()]) | not_drawn
 
 
 def _find_foot(raw: RawSolid) -> Array:

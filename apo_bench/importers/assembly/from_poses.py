@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.errors import require
+from apo_bench.importers.assembly.choices import AssemblyChoices
 from apo_bench.importers.assembly.new_scenario import NewScenario
 from apo_bench.importers.assembly.posed_parts import UPS, read_posed
 from apo_bench.importers.assembly.scenario_writer import write_scenario
@@ -11,16 +12,7 @@ from apo_bench.importers.assembly.up_axis import new_upright_scenario
 
 
 def scenario_from_poses(
-    poses: Path,
-    parts: Sequence[str],
-    out: Path,
-    source: str,
-    *,
-    up: str | None,
-    fixed: Sequence[str],
-    order: Sequence[str],
-    clearance_mm: float,
-    max_overlap_mm: float,
+    poses: Path, parts: Sequence[str], out: Path, source: str, choices: AssemblyChoices
 ) -> NewScenario:
     """Choose base, order, starts and grasps of an assembly, write the scenario file, and return the scenario.
 
@@ -28,9 +20,8 @@ def scenario_from_poses(
         poses: A file of `[[pose]]` entries.
         parts: Part files; empty: part files next to the file of poses.
         source: Names of the files of the poses, for the header of the scenario file.
-        up, fixed, order, clearance_mm, max_overlap_mm: As in `apo_bench.import_assembly`.
     """
-    require(up is None or up in UPS, f"up must be one of {', '.join(UPS)}, got {up}.")
-    made = new_upright_scenario(read_posed(poses, list(parts)), up, tuple(fixed), clearance_mm, max_overlap_mm, order)
+    require(choices.up is None or choices.up in UPS, f"up must be one of {', '.join(UPS)}, got {choices.up}.")
+    made = new_upright_scenario(read_posed(poses, list(parts)), choices)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
     return made

@@ -1,16 +1,18 @@
 """Find a grasp from above for each part of a new scenario, with the collision checks of the robot's planner."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, PadPlace, Solid, find_holds, pose
+from apo_bench.geometry import PAD_M, Array, PadPlace, Solid, find_holds, measure_extent, pose
 from apo_bench.importers.assembly.order_search import Placement
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.planning.insertion.arrival import plan_arrival
+from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.finding import find_arm
@@ -24,6 +26,9 @@ the pads then hold their uppermost 5 or 1.5 mm.
 """
 _MOST_HOLDS = 40
 """The largest number of places that are tried at each height."""
+_GRAZE_M = 0.0015
+"""A pad that reaches by less than this over a piece touches its edge only."""
+_SAME_M = 1e-6  # lengths with a smaller difference are equal
 _LIFT_M = 0.03  # the straight lift from the start that must be free
 
 
@@ -52,8 +57,8 @@ def find_grasps(
         order: The operations in their order.
         base: The fixed parts.
     """
-    arm = find_arm(_ARM)
-    kinematics = Kinematics(arm)
+    kinematics = find_kinematics()
+    arm = kinematics.arm
     best: dict[str, Grasp | None] = {}
     crowded = set[str]()
     # The poses before the operation, of the parts that are assembled.
@@ -80,6 +85,33 @@ def find_grasps(
     return GraspSearchResult(best, frozenset(crowded))
 
 
+@lru_cache(maxsize=1)
+def find_kinematics() -> Kinematics:
+    """Return the kinematics of the arm for which grasps and starts are chosen."""
+    return Kinematics(find_arm(_ARM))
+
+
+class GoalRoom:
+    """Whether the open gripper has room to hold each part at its goal, among any set of other parts."""
+
+    def __init__(self, solids: Mapping[str, Solid], poses: Poses) -> None:
+        """Take all parts at their final poses, world, [m]."""
+        self._solids = solids
+        self._poses = poses
+        self._kinematics = find_kinematics()
+        self._known: dict[tuple[str, tuple[str, ...]], bool] = {}
+
+    def has_room(self, part: str, there: Sequence[str]) -> bool:
+        """Whether some grasp of a part from above is clear of the parts that are there."""
+        key = (part, tuple(there))
+        if key not in self._known:
+            goal = _list_resting_parts(self._solids, part, {name: self._poses[name] for name in there}, (part,))
+            places = _list_holds_from_above(self._solids[part], goal.T, self._kinematics.arm.opening_m)
+            clear = (find_clear_grasp(self._kinematics, self._solids[part], each, (goal,)) for each in places)
+            self._known[key] = any(grasp is not None for grasp in clear)
+        return self._known[key]
+
+
 def _list_resting_parts(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:
     """Return a part at rest and the obstacles around it: all parts of `at` but the moved ones."""
     return RestingPart(at[part], list_obstacles({name: solids[name] for name in at}, at, moves))
@@ -93,7 +125,8 @@ def _plan_stroke(solids: Mapping[str, Solid], placing: Placement, now: Poses, go
         goal: The main part at its goal, with the obstacles there.
     """
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
-    line = plan_arrival_line(plan_arrival(assembly, placing.moves, placing.contacts, now), goal.T)
+    arrival = plan_arrival(assembly, placing.moves, placing.contacts, now, Preference(placing.along))
+    line = plan_arrival_line(arrival, goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
@@ -105,10 +138,29 @@ def _list_holds_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator
     """
     up = _up_in_part(T)
     for over in _OVER_M:
-        yield [_make_grasp(hold) for hold in _choose_best_by_height(find_holds(solid, up, opening_m, over), up)]
+        firm = (hold for hold in find_holds(solid, up, opening_m, over) if not _grazes(solid, hold, up))
+        yield [_make_grasp(hold) for hold in _choose_best_by_height(firm, up)]
 
 
-def _choose_best_by_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:
+def _grazes(solid: Solid, hold: PadPlace, up: Array) -> bool:
+    """Whether the upper or lower end of a pad lies just inside a piece, such as a chamfer, which it would push away."""
+    axes = np.array([np.cross(up, hold.across), up, hold.across])
+    half = np.array([[-PAD_M[0], PAD_M[0]], [-PAD_M[1], PAD_M[2]], [-hold.half_width, hold.half_width]])
+    pad = half + (axes @ hold.point)[:, None]
+    reach = _measure_extents(solid, tuple(map(tuple, np.round(axes, 9).tolist())))
+    common = np.minimum(pad[:, 1], reach[:, :, 1]) - np.maximum(pad[:, 0], reach[:, :, 0])
+    is_edge = common[:, 1] < np.minimum(_GRAZE_M, np.ptp(reach[:, 1], axis=1) - _SAME_M)
+    return bool(((common > 0.0).all(axis=1) & is_edge).any())
+
+
+@lru_cache(maxsize=64)
+def _measure_extents(solid: Solid, axes: tuple[tuple[float, ...], ...]) -> Array:
+    """Return the least and greatest coordinate of each piece along some axes, (pieces, axes, 2), [m]."""
+    along = [np.array(axis) for axis in axes]
+    return np.array([[measure_extent((piece,), axis) for axis in along] for piece in solid.pieces])
+
+
+def _choose_best_by_height(places: Iterable[PadPlace], up: Array) -> Iterator[PadPlace]:
     """Yield at most `_MOST_HOLDS` places of each height, from places sorted best first.
 
     Every height is kept, since a high place, though a worse hold, may be the only one with room.

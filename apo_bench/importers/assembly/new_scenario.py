@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Poses
-from apo_bench.errors import require, require_known
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Solid, measure_extent, pose
 from apo_bench.importers.assembly.contact_search import (
     close_contacts,
@@ -16,10 +16,19 @@ from apo_bench.importers.assembly.contact_search import (
     find_walls_without_play,
 )
 from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
-from apo_bench.importers.assembly.grasps import GraspSearchResult, find_grasps
+from apo_bench.importers.assembly.free_turns import list_meshing_parts
+from apo_bench.importers.assembly.grasps import GoalRoom, GraspSearchResult, find_grasps, find_kinematics
 from apo_bench.importers.assembly.order_search import OrderSearch, Placement
 from apo_bench.importers.assembly.posed_parts import TABLE, PosedPart
-from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
+from apo_bench.importers.assembly.staging import (
+    FARTHEST_M,
+    Stance,
+    choose_site,
+    find_reach,
+    find_stance,
+    stage_parts,
+)
+from apo_bench.importers.assembly.start_reach import list_unreachable_starts
 from apo_bench.importers.cad.solids import find_free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site
@@ -105,7 +114,9 @@ def new_scenario(
     ]
     reach = find_reach(solids, poses, [each.name for each in parts])
     aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
-    search = OrderSearch(solids, poses, contacts, aside, wanted_order)
+    held = {each.name for each in parts if each.held}
+    room = GoalRoom(solids, poses)
+    search = OrderSearch(solids, poses, contacts, aside, wanted_order, held, room.has_room)
     order = search.find(frozenset(base))
     if order is None:
         raise NoAssemblyOrder(
@@ -124,11 +135,80 @@ def new_scenario(
     middles = [site.center_m, site.center_m + aside[:2]] if is_beside else [site.center_m]
     kept_free = [(np.array(middle), reach + max(site.spread_m)) for middle in middles]
     turns = {each.name: poses[each.name][:3, :3] for each in parts if each.name not in base}
-    # Each part starts in its final orientation.
+    staged, found = _stage_in_reach(solids, poses, turns, order, base, kept_free)
+    notes += [*staged.notes, *list_meshing_parts(solids, poses, order, base)]
+    unfit = tuple(_find_unfit_parts(solids, turns, found))
+    return NewScenario(
+        parts=tuple(replace(each, T=poses[each.name]) for each in parts),
+        fixed=base,
+        why_fixed=why_fixed,
+        order=order,
+        starts=staged.starts,
+        stances=staged.stances,
+        fixtures=staged.fixtures,
+        grasps=found.grasps,
+        site=site,
+        clearance_mm=clearance_mm,
+        notes=(*notes, *unfit),
+        unfit=unfit,
+    )
+
+
+class _Staged(NamedTuple):
+    """Where parts start, with notes for the user; the fields are those of `NewScenario`."""
+
+    starts: Mapping[str, Array]
+    stances: Mapping[str, Stance]
+    fixtures: Mapping[str, Solid]
+    notes: list[str]
+
+
+def _stage_in_reach(
+    solids: Mapping[str, Solid],
+    poses: Poses,
+    turns: Mapping[str, Array],
+    order: Sequence[Placement],
+    base: Sequence[str],
+    kept_free: Sequence[tuple[Array, float]],
+) -> tuple[_Staged, GraspSearchResult]:
+    """Return starts and grasps, with the starts nearer to the arm where it cannot lift a part high enough farther away.
+
+    Args:
+        turns: Moved part -> its orientation, (3, 3).
+        kept_free: Discs that must stay free, each its centre, (2,), and its radius, [m].
+    """
+    kinematics = find_kinematics()
+    first: tuple[_Staged, GraspSearchResult] | None = None
+    for farthest_m in FARTHEST_M:
+        try:
+            staged = _stage(solids, poses, turns, stage_parts(solids, turns, kept_free, farthest_m))
+        except InputError:
+            if first is None:
+                raise
+            break
+        found = find_grasps(solids, poses, staged.starts, staged.fixtures, order, base)
+        first = first or (staged, found)
+        starts = {**staged.starts, TABLE: poses[TABLE]}
+        assembly = Assembly({part: solids[part] for part in (*base, *turns, TABLE)}, (), frozenset())
+        if not list_unreachable_starts(kinematics, assembly, starts, order, found.grasps):
+            return staged, found
+    assert first is not None
+    return first
+
+
+def _stage(
+    solids: Mapping[str, Solid], poses: Poses, turns: Mapping[str, Array], places: Mapping[str, Array]
+) -> _Staged:
+    """Return the starts of all parts, each moved part in its final orientation, in a fixture if it does not stand.
+
+    Args:
+        places: Moved part -> x and y of its frame, (2,), [m].
+    """
     stances = {part: find_stance(solids[part], R) for part, R in turns.items()}
-    starts = {part: np.array(poses[part]) for part in (*base, *turns)}
-    fixtures = {}
-    for part, at in stage_parts(solids, turns, kept_free).items():
+    starts = {part: np.array(poses[part]) for part in solids if part != TABLE}
+    fixtures = dict[str, Solid]()
+    notes = list[str]()
+    for part, at in places.items():
         starts[part][:3, 3] = (*at, stances[part].height_m)
         if not stances[part].stands:
             starts[part][2, 3] += FLOOR_M
@@ -137,22 +217,7 @@ def new_scenario(
             notes.append(f"'{part}' starts in a fixture made for it: it does not stand on the table")
         elif stances[part].rolls:
             notes.append(f"'{part}' lies on a round wall at its start and may roll")
-    found = find_grasps(solids, poses, starts, fixtures, order, base)
-    unfit = tuple(_find_unfit_parts(solids, turns, found))
-    return NewScenario(
-        parts=tuple(replace(each, T=poses[each.name]) for each in parts),
-        fixed=base,
-        why_fixed=why_fixed,
-        order=order,
-        starts=starts,
-        stances=stances,
-        fixtures=fixtures,
-        grasps=found.grasps,
-        site=site,
-        clearance_mm=clearance_mm,
-        notes=(*notes, *unfit),
-        unfit=unfit,
-    )
+    return _Staged(starts, stances, fixtures, notes)
 
 
 def find_lowest_part(parts: Sequence[PosedPart]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ and the part would rest stably when put back. If no single part can be removed, 
 assembly, which is put together next to the assembly first.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, combinations
 from typing import NamedTuple, final
@@ -17,7 +17,8 @@ from apo_bench.geometry import Array, Solid, measure_drop, measure_extent, pose
 from apo_bench.importers.assembly.contact_search import find_contacts
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.importers.assembly.staging import find_stance
-from apo_bench.planning.insertion.arrival import plan_arrival
+from apo_bench.planning.insertion.arrival import Arrival, plan_arrival
+from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.planning.prediction.stability import BALANCED, measure_imbalance
 
@@ -25,6 +26,9 @@ _FALLS_M = 7e-4
 """Largest drop of a part that still counts as carried: a part in a hole drops by its play."""
 _CARRIES = 1e-3
 """A contact carries weight if the vertical component of its normal is at least this."""
+_SAME = 1e-6  # directions whose cosine differs from 1 by less are equal
+_SEAT = 0.5
+"""A face ends an insertion if the cosine of its normal with the opposite of the direction is at least this."""
 _MOST_SETS = 4000
 """The search ends after this number of sets of parts without an order."""
 _LARGEST_GROUP = 4  # parts in a sub-assembly
@@ -49,6 +53,15 @@ class Placement(NamedTuple):
     """(4, 4), goal of the main part in the frame of the assembly, [m]."""
     why: str
     """The reason as a phrase: the direction of insertion and the parts that carry the main part."""
+    clamped: bool = False
+    """Whether only fasteners, which are no parts, hold the main part."""
+    along: Array | None = None
+    """Direction of insertion to state, frame of the main part, (3,); None: the planner's own choice."""
+
+
+def _always(part: str, there: Sequence[str]) -> bool:
+    """There is room for any gripper."""
+    return True
 
 
 @final
@@ -64,6 +77,10 @@ class OrderSearch:
     """(3,), offset from the assembly to the place of sub-assemblies, horizontal, [m]."""
     wanted: Sequence[str] = ()
     """The moved parts in the wanted order, which is followed where possible."""
+    held: Container[str] = ()
+    """Parts that fasteners hold: where nothing carries one of them, it is clamped."""
+    has_room: Callable[[str, Sequence[str]], bool] = _always
+    """Whether the gripper has room to hold a part at its place among the parts that are there."""
     failed: set[frozenset[str]] = field(default_factory=set)  # sets of parts that have no order
     obstacles: dict[str, RemovalObstacle] = field(default_factory=dict)
     """Part -> its obstacle in the attempt in which it passed most tests."""
@@ -109,7 +126,7 @@ class OrderSearch:
             elif found.passed >= self.obstacles.get(part, found).passed:
                 self.obstacles[part] = found
         if single:
-            yield from sorted(single, key=self._removal_priority)
+            yield from sorted(single, key=lambda placing: self._removal_priority(placing, there))
             return
         large_first = sorted(free, key=lambda part: -self.solids[part].volume)
         for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
@@ -120,15 +137,17 @@ class OrderSearch:
         if not self.left or len(free) < len(self.left):
             self.left = frozenset(free)
 
-    def _removal_priority(self, placing: Placement) -> tuple[float, ...]:
+    def _removal_priority(self, placing: Placement, there: frozenset[str]) -> tuple[float, ...]:
         """Return the sort key of a removal; the smallest is removed first, thus assembled last.
 
-        Parts late in the wanted order come first, then insertions from above, then the highest, then the smallest.
+        Parts late in the wanted order come first, then those with room for the gripper, insertions from above, the
+        highest, the smallest.
         """
         part = placing.moves[0]
         low, _ = measure_extent(self.solids[part].pieces, self.poses[part][2, :3])
         return (
             -self.wanted.index(part) if part in self.wanted else 0,
+            not self.has_room(part, sorted(there)),
             "from above" not in placing.why,
             -round(low + float(self.poses[part][2, 3]), 4),
             self.solids[part].volume,
@@ -149,31 +168,65 @@ class OrderSearch:
         contacts = tuple(Contact(a, b) for a, b in pairs if a.part in moves and b.part in rest)
         others = ", ".join(dict.fromkeys(of.part for contact in contacts for of in contact if of.part in rest))
         assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
-        # A part that is put back must have another one below and its weight over the parts that carry it. Then the
-        # contact macros give a straight path, which must be free.
         if not contacts:
             return RemovalObstacle(0, f"'{main}' touches nothing that would be there before it")
-        if (
-            min(measure_drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
-            > _FALLS_M
-        ):
-            return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
-        if (
-            measure_imbalance(ContactMeasurements(assembly), Operation(main, contacts, tuple(moves[1:])), poses)
-            > BALANCED
-        ):
-            return RemovalObstacle(
-                2, f"'{main}' would not keep its balance on {others}, which would be there before it"
-            )
+        # Then the contact macros give a straight path, which must be free.
+        falls = self._find_fall(moves, rest, contacts, assembly, others)
+        if falls is not None and main not in self.held:
+            return falls
         arrival = plan_arrival(assembly, moves, contacts, poses)
-        if all(each.normal @ UP < _CARRIES for each in arrival.touched):
-            return RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
+        if falls is None and all(each.normal @ UP < _CARRIES for each in arrival.touched):
+            falls = RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
+        if falls is not None:
+            seated = self._find_seated_arrival(assembly, moves, contacts, arrival) if main in self.held else None
+            if seated is None:
+                return falls
+            arrival = seated
         if not arrival.free:
             return RemovalObstacle(3, f"'{main}' cannot leave {others}")
         way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
-        return Placement(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
+        stated = None if falls is None else arrival.line.direction
+        why = f"comes {direction}, onto {others}"
+        return Placement(tuple(moves), contacts, poses[main], why, falls is not None, stated)
+
+    def _find_fall(
+        self, moves: Sequence[str], rest: Sequence[str], contacts: tuple[Contact, ...], assembly: Assembly, others: str
+    ) -> RemovalObstacle | None:
+        """Return why parts that are put back would fall; None if another part is below, and their weight over it.
+
+        Args:
+            rest: The other parts that are assembled.
+            others: Those that the moved parts touch, for the reason.
+        """
+        main = moves[0]
+        poses = self.poses
+        drops = (measure_drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
+        if min(drops) > _FALLS_M:
+            return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
+        operation = Operation(main, contacts, tuple(moves[1:]))
+        if measure_imbalance(ContactMeasurements(assembly), operation, poses) <= BALANCED:
+            return None
+        return RemovalObstacle(2, f"'{main}' would not keep its balance on {others}, which would be there before it")
+
+    def _find_seated_arrival(
+        self, assembly: Assembly, moves: Sequence[str], contacts: tuple[Contact, ...], first: Arrival
+    ) -> Arrival | None:
+        """Return an arrival that ends on a face, so that the robot feels when a part that is clamped is in place.
+
+        Args:
+            first: The arrival without a preferred direction.
+        """
+        R = first.T[:3, :3]
+        ways = [R @ first.line.direction, *(-each.normal for each in first.touched)]
+        for way in ways:
+            if all(each.normal @ way > -_SEAT for each in first.touched):
+                continue  # nothing stops the part
+            arrival = plan_arrival(assembly, moves, contacts, self.poses, Preference(R.T @ way))
+            if arrival.free and R @ arrival.line.direction @ way > 1.0 - _SAME:
+                return arrival
+        return None
 
     def _can_preassemble(self, group: tuple[str, ...]) -> tuple[Placement, ...] | None:
         """Return the operations that assemble a group next to the assembly, its main part on the table.
@@ -188,7 +241,7 @@ class OrderSearch:
         shift = pose.at(self.aside + np.array([0.0, 0.0, stance.height_m - float(self.poses[main][2, 3])]))
         poses = {part: shift @ self.poses[part] for part in group} | {TABLE: self.poses[TABLE]}
         solids = {part: self.solids[part] for part in (*group, TABLE)}
-        inner = OrderSearch(solids, poses, find_contacts(solids, poses), self.aside)
+        inner = OrderSearch(solids, poses, find_contacts(solids, poses), self.aside, held=self.held)
         base = frozenset((main, TABLE))
         first = inner._plan_removal((main,), base)
         rest = inner._order_removals(frozenset(solids), base)

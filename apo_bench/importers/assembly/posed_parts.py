@@ -39,6 +39,8 @@ class PosedPart:
     """Faces to mark as fit beyond those of the part file -> depth by which each recedes before the clearance, [mm]."""
     title: str = ""
     """The name in the CAD file, if a part cannot have that name in a scenario."""
+    held: bool = False
+    """Whether a fastener that is no part of the scenario holds it."""
 
 
 class _Pose(FileTable, frozen=True):
@@ -50,6 +52,7 @@ class _Pose(FileTable, frozen=True):
     title: str = ""
     quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     color: tuple[_Share, _Share, _Share] | None = None
+    held: bool = False
 
 
 class _PoseFile(FileTable, frozen=True):
@@ -78,7 +81,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
         name = find_free_name(each.name or each.part, used)
         used.add(name)
         T = pose.unpack(np.array([*np.multiply(1e-3, each.at_mm), *each.quaternion_wxyz]))
-        parts.append(PosedPart(name, file, solids[file], T, each.color, title=each.title))
+        parts.append(PosedPart(name, file, solids[file], T, each.color, title=each.title, held=each.held))
     require(2 <= len(parts) <= _MOST, f"{poses}: {len(parts)} poses were given; 2 to {_MOST} parts make an assembly.")
     left = [name for name, file in paths.items() if file not in solids]
     require(not left, f"{poses}: {', '.join(left)} has no pose; add [[pose]] part = ..., or leave the part out.")

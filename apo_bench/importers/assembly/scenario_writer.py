@@ -17,6 +17,7 @@ from apo_bench.records import Thresholds
 from apo_bench.scenario.parts import find_part_path, list_part_names
 
 _WIDTH = 118  # longest line of contacts
+_DIGITS = 8  # decimals of lengths in mm, angles in degrees and axes
 THRESHOLDS = {
     "fit_margin_mm": "gap of parts that fit beyond their play",
     "support_mm": "gap of other contacts",
@@ -95,7 +96,8 @@ def list_choices(new: NewScenario) -> Iterator[str]:
     yield f"fixed: {', '.join(new.fixed)} ({new.why_fixed})"
     for k, placing in enumerate(new.order, start=1):
         carried = f" with {', '.join(placing.moves[1:])}" if placing.moves[1:] else ""
-        yield f"{k}. {placing.moves[0]}{carried} {placing.why}: {len(placing.contacts)} contacts"
+        clamped = ", clamped there" if placing.clamped else ""
+        yield f"{k}. {placing.moves[0]}{carried} {placing.why}{clamped}: {len(placing.contacts)} contacts"
     yield from (f"note: {note}" for note in new.notes)
 
 
@@ -130,6 +132,10 @@ def _list_operation_lines(new: NewScenario, placing: Placement) -> Iterator[str]
     yield f"goal = {_format_pose(placing.at)}"
     pairs = [f'["{m.face if m.part == main else m}", "{e}"]' for m, e in placing.contacts]
     line = f"contacts = [{', '.join(pairs)}]"
+    if placing.along is not None:
+        yield f"attach = {{ along = {_format_list(placing.along)} }}"
+    if placing.clamped:
+        yield "clamp = true  # a fastener that is no part holds it: it is fixed here once its seat is felt"
     yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]
     hold = new.grasps[main]
     if hold is not None:
@@ -157,11 +163,11 @@ def _format_pose(T: Array) -> str:
 
 
 def _format_axis(axis: Array) -> str:
-    """Return an axis, (3,), as its letter if it is along x, y or z, otherwise as a list."""
+    """Return an axis, (3,), as its letter if it is along x, y or z to all digits, otherwise as a list."""
     along = int(np.abs(axis).argmax())
-    return f'"{"xyz"[along]}"' if abs(axis[along]) > 1.0 - 1e-12 else _format_list(axis)
+    return f'"{"xyz"[along]}"' if np.count_nonzero(np.round(axis, _DIGITS)) == 1 else _format_list(axis)
 
 
 def _format_list(values: Iterable[float]) -> str:
-    """Return a TOML list of numbers, rounded to 1e-8 to hide rounding errors."""
-    return "[" + ", ".join(f"{round(float(x), 8) + 0.0:.12g}" for x in values) + "]"
+    """Return a TOML list of numbers, rounded to hide rounding errors."""
+    return "[" + ", ".join(f"{round(float(x), _DIGITS) + 0.0:.12g}" for x in values) + "]"

@@ -20,7 +20,8 @@ _LEVEL = 1e-6  # a cylinder's axis is horizontal below this vertical component
 _BASE_M = (-0.42, 0.0)
 """Base of the arm in x and y, world."""
 _NEAREST_M = 0.27  # inner radius of the reach around the base
-_FARTHEST_M = 0.66  # outer radius of the reach
+FARTHEST_M = (0.66, 0.56, 0.48, 0.42)
+"""Outer radii of the reach; of high assemblies a smaller one is used."""
 _LIKED_M = (0.05, 0.27)
 """Preferred place of starts in x and |y|; parts start as near to it as possible, at either side."""
 _ROOMS_M = (0.055, 0.04, 0.03)
@@ -108,25 +109,30 @@ def find_reach(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) 
 
 
 def stage_parts(
-    solids: Mapping[str, Solid], turns: Mapping[str, Array], kept_free: Sequence[tuple[Array, float]]
+    solids: Mapping[str, Solid],
+    turns: Mapping[str, Array],
+    kept_free: Sequence[tuple[Array, float]],
+    farthest_m: float = FARTHEST_M[0],
 ) -> Mapping[str, Array]:
     """Return the start of each part's frame in x and y, (2,), [m]; the largest part is placed first.
 
     Args:
         turns: Part -> its orientation, (3, 3).
         kept_free: Discs that must stay free, each its centre, (2,), and its radius, [m].
+        farthest_m: Largest distance from the base of the arm.
 
     Raises:
         InputError: There is no room.
     """
     boxes = {part: _bounding_rectangle(solids[part], R) for part, R in turns.items()}
+    grid = _list_grid_places(farthest_m)
     for room in _ROOMS_M:
         places: dict[str, Array] = {}
         taken: list[tuple[Array, Array]] = []
         for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
             low, high = boxes[part]
             half = (high - low) / 2
-            middle = next((at for at in _list_grid_places() if _is_free(at, half, taken, kept_free, room)), None)
+            middle = next((at for at in grid if _is_free(at, half, taken, kept_free, room)), None)
             if middle is None:
                 break
             taken.append((middle, half))
@@ -159,12 +165,12 @@ def _is_free(
     return is_apart and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
 
 
-def _list_grid_places() -> Array:
+def _list_grid_places(farthest_m: float) -> Array:
     """Return the candidate places within reach of the arm, (k, 2), the nearest to `_LIKED_M` first."""
     x, y = np.meshgrid(np.arange(-0.2, 0.26, _GRID_M), np.arange(-0.45, 0.451, _GRID_M), indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
     far = np.hypot(*(places - _BASE_M).T)
-    places = places[(far > _NEAREST_M) & (far < _FARTHEST_M)]
+    places = places[(far > _NEAREST_M) & (far < farthest_m)]
     cost = np.hypot(places[:, 0] - _LIKED_M[0], np.abs(places[:, 1]) - _LIKED_M[1])
     # Ties by y, so that the order is the same on every machine.
     return np.asarray(places[np.lexsort((places[:, 1], np.round(cost, 6)))])

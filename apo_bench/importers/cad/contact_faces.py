@@ -1,5 +1,7 @@
 """Convert named regions of a solid to the flat and round faces of a part, [m]."""
 
+from typing import Any
+
 import numpy as np
 import shapely
 
@@ -8,6 +10,7 @@ from apo_bench.importers.cad.faces.surface_fitting import ON_WALL
 from apo_bench.importers.cad.solids import RawSolid, Region, find_square_axes
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
+_SNAP_MM = 1e-6  # grid on which triangles that overlap are united
 _THINNEST_MM = 0.05  # largest radius of a round face that is too thin for contacts
 
 
@@ -40,7 +43,7 @@ def _make_flat_face(raw: RawSolid, region: Region) -> Face | None:
     n = region.direction
     flat = np.array(find_square_axes(n))
     triangles = raw.mesh.corners[raw.mesh.triangles[region.triangles]] @ flat.T
-    area = shapely.coverage_union_all(shapely.polygons(triangles))
+    area = _unite(shapely.polygons(triangles))
     if area.geom_type != "Polygon":
         return None
     offset = float(n @ region.point) * n
@@ -48,6 +51,14 @@ def _make_flat_face(raw: RawSolid, region: Region) -> Face | None:
     drawn = [_refine_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
     outline, *holes = (straighten(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
     return Face(region.name, outline, tuple(holes))
+
+
+def _unite(triangles: Any) -> Any:
+    """Return the area of triangles in a plane; overlaps of slivers are united as well."""
+    try:
+        return shapely.coverage_union_all(triangles)
+    except shapely.GEOSException:
+        return shapely.union_all(triangles, grid_size=_SNAP_MM)
 
 
 def _refine_circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:

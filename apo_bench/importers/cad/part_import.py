@@ -10,7 +10,7 @@ import numpy as np
 from shapely import Polygon
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays
+from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays, measure_face_area
 from apo_bench.importers.cad.contact_faces import make_contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
@@ -18,11 +18,19 @@ from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.importers.cad.meshes.shells import split_into_solids
 from apo_bench.importers.cad.moments import compute_piece_moments, compute_solid_moments
 from apo_bench.importers.cad.pieces.convex_cutting import CutSolid, cut_solid
-from apo_bench.importers.cad.solids import RawSolid, clean_title, merge_copies, name_regions
+from apo_bench.importers.cad.solids import (
+    Mesh,
+    RawSolid,
+    SolidPlace,
+    clean_title,
+    make_hull_solid,
+    merge_copies,
+    name_regions,
+)
 from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.face_checks import check_faces, find_supported_area
-from apo_bench.scenario.parts.limits import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
+from apo_bench.scenario.parts.limits import DENSITY, HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.scenario.parts.making import Body, build_solid, write_part
 from apo_bench.scenario.parts.making.moments import Moments
 
@@ -54,21 +62,34 @@ class ImportedPart:
     """Hole -> the largest radius free of pieces around its axis, [mm]."""
 
 
-def read_raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
+def read_raw_solids(
+    path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES, lenient: bool = False
+) -> tuple[CadFile, list[RawSolid]]:
     """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
 
     Args:
         unit: Unit of a mesh file; None: as stated or guessed.
         fewest_sides: Smallest number of facets of a round face around a full turn in a mesh.
+        lenient: Whether the convex hull stands for a solid whose surface is open or crosses itself.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
     if path.suffix.lower() in STEP_SUFFIXES:
-        return read_step(path, unit)
+        return read_step(path, unit, lenient)
     file, meshes = read_meshes(path, unit)
-    solids = merge_copies(raw for name, mesh in meshes for raw in split_into_solids(path, name, mesh))
+    solids = merge_copies(raw for name, mesh in meshes for raw in _split_mesh(path, name, mesh, lenient))
     return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
+
+
+def _split_mesh(path: Path, name: str, mesh: Mesh, lenient: bool) -> list[RawSolid]:
+    """Return the solids of a mesh, or if allowed its convex hull where it is no closed surface."""
+    try:
+        return list(split_into_solids(path, name, mesh))
+    except InputError as error:
+        if not lenient:
+            raise
+        return [make_hull_solid(name, mesh.corners, (SolidPlace(name, np.eye(4)),), str(error))]
 
 
 def import_solid(
@@ -78,6 +99,7 @@ def import_solid(
     source: str,
     density: float = 1000.0,
     others: Array | None = None,
+    pieces: CutSolid | None = None,
 ) -> ImportedPart:
     """Import one solid: write `NAME.xml` and `NAME.toml`, and read the part back.
 
@@ -85,20 +107,19 @@ def import_solid(
         source: The name of the file, for messages and the part file.
         density: [kg/m^3].
         others: Points of other solids that come near, (k, 3), [mm], where pieces must be finest; None: unknown.
+        pieces: Its convex pieces; None: the solid is cut exactly.
 
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
     """
-    weight = 1e-9 * density * raw.mesh.volume
-    require(
-        LIGHTEST_KG <= weight <= HEAVIEST_KG,
-        f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; "
-        f"{1e3 * LIGHTEST_KG:g} g to {HEAVIEST_KG / 1e3:g} t are allowed.",
-    )
+    density, repairs = _choose_density(source, raw.mesh.volume, density)
+    raw = replace(raw, repairs=(*raw.repairs, *repairs))
     flats, rounds, refused = make_contact_faces(raw)
-    _check_faces(source, len(flats) + len(rounds))
+    require(
+        flats or rounds, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is."
+    )
     try:
-        pieces = cut_solid(raw, others)
+        pieces = cut_solid(raw, others) if pieces is None else pieces
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     refused |= dict.fromkeys(pieces.filled, _FILLED)
@@ -107,7 +128,8 @@ def import_solid(
     body, shares = _keep_held_faces(
         _remove_faces(body, refused), _LEAST_SHARE if pieces.hulls else _NEARLY_ALL, refused
     )
-    _check_faces(source, len(body.flats) + len(body.rounds))
+    body = _keep_largest_faces(body, refused)
+    require(body.flats or body.rounds, f"{source}: no flat or round face of the part is left; draw a simpler one.")
     stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
     title = clean_title(raw.name) if raw.name != name else ""
     stated |= {"density": density, "source": source, "title": title, "licence": "as that file"}
@@ -127,10 +149,38 @@ def import_solid(
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
 
 
-def _check_faces(source: str, count: int) -> None:
-    """Raise InputError for a part without faces or with too many."""
-    require(count, f"{source}: no face of the part is flat or round, so it can touch nothing; draw one that is.")
-    require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
+def _choose_density(source: str, volume: float, density: float) -> tuple[float, tuple[str, ...]]:
+    """Return the density of a part, [kg/m^3], and what was changed: a part that is too light for a simulation gets
+    the least mass.
+
+    Args:
+        volume: [mm^3].
+
+    Raises:
+        InputError: No density within the limits gives an allowed mass.
+    """
+    weight = 1e-9 * density * volume
+    raised = max(density, LIGHTEST_KG / (1e-9 * volume)) if volume > 0.0 else np.inf
+    require(
+        raised <= DENSITY[1] and weight <= HEAVIEST_KG,
+        f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; "
+        f"{1e3 * LIGHTEST_KG:g} g to {HEAVIEST_KG / 1e3:g} t are allowed.",
+    )
+    if raised == density:
+        return density, ()
+    return raised, (f"it weighs {1e3 * weight:.3g} g, and is simulated with {1e3 * LIGHTEST_KG:g} g",)
+
+
+def _keep_largest_faces(body: Body, refused: dict[str, str]) -> Body:
+    """Return the body with its round faces and its largest flat ones, as many as a part may have.
+
+    Args:
+        refused: Gets the omitted faces with the reason.
+    """
+    large_first = sorted(body.flats, key=lambda face: -measure_face_area(face))
+    omitted = [face.name for face in large_first[max(0, MOST_FACES - len(body.rounds)) :]]
+    refused |= dict.fromkeys(omitted, f"it is smaller than {MOST_FACES} other faces, which are the most")
+    return _remove_faces(body, refused)
 
 
 def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list[Moments]:
@@ -146,6 +196,8 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
     )
     moments = compute_solid_moments(raw, pieces)
     own = compute_piece_moments(pieces.pieces)
+    if pieces.coarse:
+        return [own]
     if all(region.kind == "plane" for region in raw.regions):
         filled = 1e9 * own.size
         require(

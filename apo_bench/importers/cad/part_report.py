@@ -38,7 +38,7 @@ def report_part(part: ImportedPart) -> dict[str, Any]:
         "size_mm": np.ptp(raw.mesh.corners, axis=0).tolist(),
         "triangles": len(raw.mesh.triangles),
         "repairs": list(raw.repairs),
-        "places": [{"name": name, "matrix_mm": T.tolist(), "color": color} for name, T, color in raw.places],
+        "places": [{"name": name, "matrix_mm": T.tolist(), "color": color} for name, T, color, _ in raw.places],
         "faces": {name: _report_face(part, name, region) for name, region in raw.named().items()},
         "kinds": dict(Counter(region.kind for region in raw.regions)),
         "volume_mm3": {"before": raw.mesh.volume, "after": 1e9 * part.solid.volume},

@@ -43,6 +43,7 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
         lines.append(f"quaternion_wxyz = {_format_list(packed[3:])}")
         if place.color is not None:
             lines.append(f"color = {_format_list(np.round(place.color, 4))}")
+        lines += ["held = true  # by a fastener that was left out"] * place.held
     path = folder / "poses.toml"
     write_file(path, "\n".join(lines) + "\n")
     return path

@@ -73,8 +73,13 @@ def measure_imbalance(
         poses: Of every part after the operation, world frame, [m].
         room_m: The centre of mass is also shifted by this distance to four sides; the largest imbalance counts.
         ceilings: Whether faces above may push down. If not, the result is 0 for an operation without a ceiling.
+
+    Returns:
+        The share; 0 for a part that is clamped at its place.
     """
     assembly = known.assembly
+    if operation.clamped:  # nothing need carry it
+        return 0.0
     centroid = _compute_centroid(assembly, operation, poses)
     offs = _CENTROID_SHIFTS * room_m if room_m else _CENTROID_SHIFTS[:1]  # row 0: no shift
     if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):

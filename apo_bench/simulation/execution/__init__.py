@@ -13,6 +13,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState,
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.simulation.execution.transfer import (
+    SAFE_M,
     Grip,
     Transfer,
     compute_transferred_poses,
@@ -25,6 +26,7 @@ __all__ = (
     "OPEN_TO_PICK_M",
     "OPEN_TO_RELEASE_M",
     "PROBING_ACTIONS",
+    "SAFE_M",
     "STAND_OFF_M",
     "Execution",
     "ExecutionConfig",

@@ -28,6 +28,7 @@ from apo_bench.simulation.robot import (
     translate,
 )
 from apo_bench.simulation.robot.paths import distance
+from apo_bench.simulation.scene import release_clamp, weld_clamp
 
 _LIFT = (0.4, 0.25)  # peak speeds of lifting [m/s]: of a single part, and of one that carries others
 _CARRY = (0.5, 0.35)  # as `_LIFT`, through the air
@@ -68,6 +69,7 @@ def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
     """
+    release_clamp(robot.scene.work, robot.data, t.part)
     for other in t.squaring:
         robot.stage = "pick"
         centre(robot, t, other, t.T_world_start)
@@ -150,9 +152,9 @@ def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_
     # After a level insertion down onto the floor of the slot, else on in the direction of the insertion.
     lower = rise if t.into.level else 0.0
     guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.direction, t.place_n)
-    robot.follow(
-        plan_steady_trajectory(robot.T, translate(robot.T, guard.direction, lower + _OVERTRAVEL_M), _TOUCH), guard
-    )
+    if t.lands or not t.into.level:
+        end = translate(robot.T, guard.direction, lower + _OVERTRAVEL_M)
+        robot.follow(plan_steady_trajectory(robot.T, end, _TOUCH), guard)
     robot.stand()
     _slides(robot, t, left)
     _leave_there(robot, t, grip, left)
@@ -197,9 +199,13 @@ def choose_pace(t: Transfer, second: Grip | None) -> Pace:
 def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
     """Release the part and depart; abort if the insertion was stopped more than `_ARRIVED_M` before its end.
 
+    A part that is held by fasteners is clamped first, if the last motion ended on contact.
+
     Args:
         left: What is left of the insertion, [m].
     """
+    if t.clamps_to and robot.felt and left <= _ARRIVED_M:
+        weld_clamp(robot.scene.work, robot.data, t.part, t.clamps_to)
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:
@@ -266,8 +272,9 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
             return left + t.into.left, grip
         grip, rise = _with_other_grip(robot, t, grip, second, T_search)
     left = _to_goal(robot, t, grip, rise, T_search)
-    lower = translate(robot.T, UP, -rise - _OVERTRAVEL_M)
-    robot.follow(plan_steady_trajectory(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
+    if t.lands:
+        lower = translate(robot.T, UP, -rise - _OVERTRAVEL_M)
+        robot.follow(plan_steady_trajectory(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.stand()
     return left, grip
 
@@ -339,22 +346,25 @@ def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
 def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
     """Raise the part off the floor by `_OFF_M`, slide it sideways until it touches, and put it down again.
 
+    A part that nothing carries, since it is clamped, is neither raised nor put down.
+
     Args:
         side: Direction of the slide, (3,), world.
         touched: Directions of earlier slides. The part first moves off these sides by `_LOOSE_M`, since the guard
             would take friction on them for the contact.
     """
     robot.macro = "slide-to-contact"
-    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
+    if t.lands:
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
     if touched:
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
     robot.stand()
     robot.follow(
         plan_steady_trajectory(robot.T, translate(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n)
     )
-    robot.follow(
-        plan_steady_trajectory(robot.T, translate(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n)
-    )
+    if t.lands:
+        down = translate(robot.T, UP, -_OFF_M - _OVERTRAVEL_M)
+        robot.follow(plan_steady_trajectory(robot.T, down, _TOUCH), Guard(-UP, t.place_n))
     robot.stand()
 
 

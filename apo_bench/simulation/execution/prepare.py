@@ -37,7 +37,7 @@ from apo_bench.simulation.execution.transfer import (
     plan_arrival_line,
 )
 from apo_bench.simulation.robot import Trajectory, follow_waypoints, plan_waypoints, solve_end_angles
-from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.scene import Scene, list_clamps
 
 _GRAVITY = 9.81  # [m/s^2]
 _PLACE_WEIGHTS = 6.0  # guard of putting down, in weights of the moved parts
@@ -46,6 +46,8 @@ _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the
 _FIRM_N = 80.0
 """Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
 an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
+_CARRIES = 0.1
+"""A face carries weight if the vertical component of its normal is at least this."""
 _FINGER_M = 0.01
 """Length of the fingers below the tip."""
 
@@ -183,6 +185,8 @@ def _transfer(
         insert_n=_INSERT_WEIGHTS * min(near, default=held),
         slide_n=_SLIDE_WEIGHTS * min(near, default=held),
         clearance=1e-3 * scene.clearance_mm,
+        clamps_to="" if undo else list_clamps(scene.scenario).get(part, "") if operation.clamped else "",
+        lands=not operation.clamped or any(each.normal[2] > _CARRIES for each in comes.touched),
         front=_front(scene, part, operation.moves, after, into.direction) if spiral and inserts else None,
     )
 

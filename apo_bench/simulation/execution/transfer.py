@@ -123,6 +123,10 @@ class Transfer:
     """A `FlatPlacement`, at which the part is laid flat before its insertion; None if it is not."""
     side_touches: tuple[Any, ...] = ()
     """`SideTouch` each: touches of a wall with the side of the part, before an insertion from above."""
+    clamps_to: str = ""
+    """The part to which the part is clamped once its seat is felt; empty if it is not clamped."""
+    lands: bool = True
+    """Whether another part carries it at its goal, so that a level motion ends by lowering it."""
     front: Array | None = None
     """Foremost point of the moved parts on the way to the goal, in the frame of the part, (3,), [m]; None if the robot
     does not search for the hole."""
@@ -169,7 +173,7 @@ class Transfer:
     @property
     def floats(self) -> float:
         """Height by which a part that was observed on the floor of its slot must rise to be free on all sides, [m]."""
-        return 0.5 * self.clearance
+        return 0.5 * self.clearance if self.lands else 0.0
 
     def with_tip_at(self, T: Array) -> "Transfer":
         """Return the transfer of a robot whose real tip is at T, (4, 4), in the frame of the estimated tip."""

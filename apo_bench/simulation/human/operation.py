@@ -13,6 +13,7 @@ from apo_bench.scenario import (
     Scenario,
     list_nominal_operations,
 )
+from apo_bench.simulation.scene import list_clamps
 
 _SIDE_M = 0.002
 """Distance to the sides of a part while it is lowered before a slide, or lifted after one."""
@@ -45,6 +46,8 @@ class HandOperation:
     """Whether the part is inserted level, over a floor without play."""
     late: tuple[str, ...]
     """Displaced parts that the other hand now moves to their true poses."""
+    clamps_to: str
+    """The part to which the part is clamped before it is released; empty if it is not clamped."""
 
     @property
     def from_above(self) -> bool:
@@ -79,8 +82,9 @@ def plan_hand_operation(
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
         over=top + (float(stages[k][operation.main][2, 3]) - bottom) + OVER_M,
-        drags=abs(direction[2]) < 0.5 and on_floor,
+        drags=abs(direction[2]) < 0.5 and on_floor and not operation.clamped,
         late=late,
+        clamps_to=list_clamps(scenario).get(operation.main, "") if operation.clamped else "",
     )
 
 

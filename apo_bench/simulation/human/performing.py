@@ -13,6 +13,7 @@ from apo_bench.simulation.robot import (
     smooth_trajectory,
     translate,
 )
+from apo_bench.simulation.scene import release_clamp, weld_clamp
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
@@ -36,6 +37,7 @@ _SETTLE_S = 0.15
 
 def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
     """Carry out an operation, and wait until everything rests."""
+    release_clamp(hands.world, hands.data, operation.part)
     T = hands.grab(0, operation.part)
     for part in operation.carries:
         hands.add(0, part)
@@ -53,6 +55,8 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
     if operation.aside.any():
         hands.move((0, smooth_trajectory(beside, goal, _SHIFT)))
         hands.wait(0.05)
+    if operation.clamps_to:
+        weld_clamp(hands.world, hands.data, operation.part, operation.clamps_to)
     hands.let_go(0, operation.part, *operation.carries)
     hands.wait(STAND_STILL_S)
 
@@ -74,7 +78,7 @@ def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) 
     Over a floor without play the part is raised by half the clearance, to avoid friction.
     """
     goal = target = translate(operation.target, UP, clearance_m / 2) if operation.drags else operation.target
-    if operation.from_above:
+    if operation.from_above and not operation.clamps_to:
         goal = translate(operation.target, UP, _DROP_M + (_rise(hands, operation, T) if operation.carries else 0.0))
     beside = translate(goal, operation.aside, 1.0) if operation.aside.any() else goal
     return translate(translate(target, operation.direction, -operation.travel), operation.aside, 1.0), beside, goal

@@ -96,6 +96,8 @@ class Robot:
         self.macro = ""
         self.step: Step | None = None
         self.slip_monitor = GraspSlipMonitor()
+        self.felt = False
+        """Whether the last motion with a guard ended on contact."""
         self.left_out_s = 0.0
         """Time skipped without simulation so far, [s]."""
         self.wrist: WristSensor | None = None
@@ -158,6 +160,7 @@ class Robot:
         if np.abs(line.start - line.end).max() < 1e-7:  # nothing to do
             return 0.0
         kinematics = self.scene.kinematics
+        self.felt = self.felt and guard is None
         line, knots = limit_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
         # Progress along the line after each of n physics steps.
         n = max(1, round(line.seconds / self.step_s))
@@ -175,6 +178,7 @@ class Robot:
                 fast_forward(work, self.data, kinematics.forward, joints, q - self.q, velocity[0], self.forces.held)
                 self._pass((begin - done) * self.step_s)
             if self._run(feedforward_command(path, velocity, self._lead, self._stick)[1:], guard) < end - begin:
+                self.felt = True
                 # The guard stopped it: the measured joint angles become the command, which takes the pressure away.
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)

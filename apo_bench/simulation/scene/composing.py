@@ -16,12 +16,15 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, place_layout
 from apo_bench.scenario.parts import PartFile, read_part
 from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.physics import Physics, set_contact, set_options
+from apo_bench.simulation.scene.clamps import list_clamps
 from apo_bench.simulation.scene.contact_bits import OF_PARTS, Bits, meetings
 from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.walls import simulated_pieces
-from apo_bench.simulation.scene.world import WRIST_SENSORS
+from apo_bench.simulation.scene.world import CLAMP, WRIST_SENSORS
+from apo_bench.simulation.scene.wrist_camera import add_wrist_camera
 
 HANDS = ("hand0", "hand1")
 _HAND_SOLREF = (0.01, 1.0)
@@ -62,25 +65,28 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
         )
         for part, body in _movable_bodies(scenario, spec).items():
             _add_weld(spec, f"{hand}_{part}", hand, body, _HAND_SOLREF, _HAND_SOLIMP)
+    _add_clamps(spec, scenario)
     return spec
 
 
-def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
-    """The world of the replay: the room with parts, the arm, force sensors, and welds for the ideal gripper.
+def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, kinematics: Kinematics) -> Any:
+    """The world of the replay: the room with parts, the arm, its camera and sensors, and welds for the ideal gripper.
 
     The wrist sensors come last; they stay off until a replay needs them (`switch_wrist_sensors_on`).
 
     Args:
         grasp: `friction` or `weld`.
-        first_link: The first body of the arm that moves.
+        kinematics: Those of the arm.
     """
     spec = room.copy()
     if grasp == "weld":
         for part, body in _movable_bodies(scenario, spec).items():
             _add_weld(spec, f"grasp_{part}", f"arm/{arm.mount}", body, _ARM_SOLREF, _ARM_SOLIMP)
+    _add_clamps(spec, scenario)
     _add_arm(spec, arm, settings)
-    _add_force_sensors(spec, scenario, f"arm/{first_link}")
+    _add_force_sensors(spec, scenario, f"arm/{kinematics.first_link}")
     _add_wrist_sensors(spec, f"arm/{arm.mount}")
+    add_wrist_camera(spec, kinematics)
     return spec
 
 
@@ -166,6 +172,12 @@ def fixed_parts(scenario: Scenario) -> tuple[str, ...]:
 def _movable_bodies(scenario: Scenario, spec: Any) -> Mapping[str, str]:
     """Movable part -> the inner body, which has its mass; the outer body with the joint has none."""
     return {part: spec.body(f"{part}/").bodies[0].name for part in movable_parts(scenario)}
+
+
+def _add_clamps(spec: Any, scenario: Scenario) -> None:
+    """Add the inactive welds of the parts that operations clamp."""
+    for part, other in list_clamps(scenario).items():
+        _add_weld(spec, f"{CLAMP}{part}", f"{other}/", f"{part}/", _ARM_SOLREF, _ARM_SOLIMP)
 
 
 def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[float], solimp: Iterable[float]) -> None:

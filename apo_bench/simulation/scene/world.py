@@ -16,6 +16,8 @@ from apo_bench.simulation.frames import frame, quaternion, rotation
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _WHEN_FELT = int(mujoco.mjtStage.mjSTAGE_ACC)  # stage of a step in which a force sensor is computed
 _NEVER = int(mujoco.mjtStage.mjSTAGE_NONE)  # the same, for a sensor that is off
+CLAMP = "clamp_"
+"""Prefix of the name of a weld that fixes a part to another one; all other welds hold a part in a hand."""
 WRIST_SENSORS = ("wrist_force", "wrist_torque")
 """Force (3,) [N] and torque (3,) [Nm] of the arm on its hand, in the frame of the mount."""
 
@@ -41,6 +43,10 @@ class World:
     """Movable part -> first index of its velocity in `qvel`."""
     geom_part: Ints
     """Per geom: index into free + fixed, -1 for everything else (arm, hands)."""
+    grips: Ints
+    """Ids of the welds that hold a part in a hand."""
+    clamps: Ints
+    """Ids of the welds that fix a part to another one."""
 
 
 def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
@@ -48,6 +54,8 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
     body = {part: model.body(f"{part}/").id for part in free + fixed}
     root = {body_id: i for i, body_id in enumerate(body.values())}
     geom_part = np.array([root.get(int(b), -1) for b in model.body_rootid[model.geom_bodyid]])
+    welds = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_WELD))
+    is_clamp = np.array([model.equality(int(i)).name.startswith(CLAMP) for i in welds], dtype=np.bool_)
     joints = {part: int(model.body(f"{part}/").jntadr[0]) for part in free}
     return World(
         model=model,
@@ -57,6 +65,8 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
         qpos={part: int(model.jnt_qposadr[j]) for part, j in joints.items()},
         dof={part: int(model.jnt_dofadr[j]) for part, j in joints.items()},
         geom_part=geom_part,
+        grips=welds[~is_clamp],
+        clamps=welds[is_clamp],
     )
 
 
@@ -168,14 +178,13 @@ def take_snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     poses.update({part: start[part] for part in world.fixed})
     a, b = _contact_parts(world, data)
     between = (a >= 0) & (b >= 0) & (a != b)  # contacts between two different parts
-    welds = world.model.eq_type == int(mujoco.mjtEq.mjEQ_WELD)
     return Snapshot(
         poses=poses,
         penetration_m=float(max(0.0, -np.min(data.contact.dist[between], initial=0.0))),
         speed_m_s=float(max(np.linalg.norm(data.qvel[v : v + 3]) for v in world.dof.values())),
         spin_rad_s=float(max(np.linalg.norm(data.qvel[v + 3 : v + 6]) for v in world.dof.values())),
-        # No weld is active, and no part touches the arm or a hand, whose `geom_part` is -1.
-        released=not bool(data.eq_active[welds].any() or ((a >= 0) != (b >= 0)).any()),
+        # No hand holds a part by a weld, and no part touches the arm or a hand, whose `geom_part` is -1.
+        released=not bool(data.eq_active[world.grips].any() or ((a >= 0) != (b >= 0)).any()),
     )
 
 

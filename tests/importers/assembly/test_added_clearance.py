@@ -33,7 +33,9 @@ def width(solid: Solid, clearance_mm: float = 0.0) -> float:
 @pytest.mark.parametrize("over", [0.0, 0.02, 0.1])
 def test_a_tongue_as_wide_as_its_slot_or_wider_gets_play_that_the_file_states(tmp_path: Path, over: float) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
-    (_, tongue), (note,) = add_clearance(parts, 0.25)
+    (_, tongue), (pair,), _ = add_clearance(parts, 0.25, 1.0)
+    note = pair.describe(0.25)
+    assert (pair.part, pair.other, pair.depth_mm) == ("tongue", "base", pytest.approx(over, abs=1e-5))
     assert sorted(tongue.fit.values()) == pytest.approx([over, over], abs=1e-5)
     assert width(tongue.solid) == pytest.approx(20.0, abs=1e-4)
     assert width(tongue.solid, 0.25) == pytest.approx(19.5, abs=1e-4)
@@ -55,4 +57,4 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
     tmp_path: Path, over: float, clearance: float, most: float
 ) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
-    assert add_clearance(parts, clearance, most) == (parts, ())
+    assert add_clearance(parts, clearance, most) == (parts, (), ())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import pose
+from apo_bench.importers.assembly.choices import AssemblyChoices
 from apo_bench.importers.assembly.new_scenario import NoAssemblyOrder
 from apo_bench.importers.assembly.posed_parts import PosedPart
 from apo_bench.importers.assembly.scenario_writer import format_scenario
@@ -39,6 +40,7 @@ def box(low: float, high: float) -> Body:
     return join(*(extrude(side, low, high) for side in sides))
 
 
+Z_UP = AssemblyChoices("z")
 FLOOR = extrude(make_rectangle(50, 50), 0, 10, bottom="bottom", top="top")
 CORE = extrude(make_rectangle(20, 20), 0, 15, bottom="foot", top="head")
 
@@ -46,7 +48,7 @@ CORE = extrude(make_rectangle(20, 20), 0, 15, bottom="foot", top="head")
 def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None:
     shut = join(FLOOR, box(10, 40), extrude(make_rectangle(50, 50), 40, 48))
     with pytest.raises(NoAssemblyOrder, match=r"'core' cannot leave shut"):
-        new_upright_scenario(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
+        new_upright_scenario(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), Z_UP)
 
 
 def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
@@ -55,10 +57,10 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     assert new_upright_scenario(parts).up == "z"
     over = turned(parts, 180, 0, 0)
     with pytest.raises(NoAssemblyOrder, match="'core' cannot leave cup"):
-        new_upright_scenario(over, "z", ("cup",))
-    found = new_upright_scenario(over, fixed=("cup",))
+        new_upright_scenario(over, AssemblyChoices("z", ("cup",)))
+    found = new_upright_scenario(over, AssemblyChoices(fixed=("cup",)))
     assert found.up.startswith("-z, as with z up there is no order")
-    assert new_upright_scenario(over, "-z", ("cup",)).up == "-z, as asked"
+    assert new_upright_scenario(over, AssemblyChoices("-z", ("cup",))).up == "-z, as asked"
     assert "# Up: -z, as with z up" in format_scenario(found, "own", "a test", tmp_path / "own.toml")
     assert [placing.moves for placing in found.order] == [("core",)]
 
@@ -67,8 +69,8 @@ def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_t
     cup = join(FLOOR, box(10, 25))
     over = turned(made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10))), 180, 0, 0)
     with pytest.raises(NoAssemblyOrder):
-        new_upright_scenario(over, "z", ("cup",))
-    found = new_upright_scenario(over, "z")
+        new_upright_scenario(over, AssemblyChoices("z", ("cup",)))
+    found = new_upright_scenario(over, Z_UP)
     assert found.fixed == ("core",)
     assert found.why_fixed.startswith("one of the lowest")
     assert [placing.moves for placing in found.order] == [("cup",)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.importers.cad.meshes.corner_merging import SAME_CORNER, merge_corners
+from apo_bench.importers.cad.meshes.cracks import close_cracks
 from apo_bench.importers.cad.solids import (
     Mesh,
     RawSolid,
@@ -40,7 +41,7 @@ def split_into_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     Raises:
         InputError: A shell is open, or its triangles lie on each other.
     """
-    joined, _ = merge_corners(mesh, SAME_CORNER * mesh.extent)
+    joined = close_cracks(merge_corners(mesh, SAME_CORNER * mesh.extent)[0])
     found = [shell for run in _list_closed_runs(joined) for shell in _split_into_shells(path, run)]
     require(found, f"{path}: the triangles make no solid; save the part as a closed mesh.")
     require(len(found) <= _MOST_SHELLS, f"{path}: the file holds {len(found)} shells; {_MOST_SHELLS} are the most.")

@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
+from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
 from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace
@@ -24,6 +25,7 @@ _WEDGES = 300
 """In an assembly, unused holes are filled if all holes would need more wedges than this."""
 _CRUMB = 1e-3
 """Groups of pieces that touch no others are dropped if they are below this share of the volume of the solid."""
+_COARSE_CRUMB = 0.03  # the same share for coarse pieces
 _LOSS = 1e-3
 """A piece counts as a hull of a free-form shape if its volume is off by more than this share."""
 
@@ -37,13 +39,16 @@ class CutSolid(NamedTuple):
     """The number of pieces that are hulls of hollow or free-form shapes, or were dropped."""
     filled: tuple[str, ...] = ()
     """Names of the round holes that are filled, as pieces around them would be too many."""
+    coarse: bool = False
+    """Whether pieces are exact only next to faces that other solids come near."""
 
 
-def cut_solid(raw: RawSolid, others: Array | None = None) -> CutSolid:
+def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) -> CutSolid:
     """Cut a solid into convex pieces: exact at flat faces, wedges that touch the fitted wall around round holes.
 
     Args:
         others: Points of other solids that come near, (k, 3), [mm]; None: unknown.
+        coarse: Whether to cut only along flat faces that other solids come near; hulls stand for the rest.
 
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
@@ -63,21 +68,23 @@ def cut_solid(raw: RawSolid, others: Array | None = None) -> CutSolid:
     hulls = 0
     outlines: list[Array] = []
     beside = HollowSpace(size, flats, None if others is None else cKDTree(others))
-    for part in cut_at_shoulders(cut_into_convex_parts(body, beside), shafts, size):
-        coarse = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
-        if len(coarse) < 4 or not is_thick(coarse):
+    parts = cut_into_coarse_parts(body, raw, beside) if coarse else cut_into_convex_parts(body, beside)
+    for part in cut_at_shoulders(parts, shafts, size):
+        rough = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
+        if len(rough) < 4 or not is_thick(rough):
             continue
-        fine = refine_shaft_corners(coarse, shafts)
+        fine = refine_shaft_corners(rough, shafts)
         corners = list_hull_corners(fine, flats, part.planes)
         # A hull fills concave parts, and loses volume where corners are dropped; rounded walls are no error.
         true = part.body.volume()
-        coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
-        hulls += abs(coarse_volume - true + kept_volume - fine_volume) > _LOSS * true
+        rough_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (rough, fine, corners))
+        hulls += abs(rough_volume - true + kept_volume - fine_volume) > _LOSS * true
         outlines.append(corners)
     # Most important holes first: those that other solids come near, then the widest.
     kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
     # Unused holes, such as screw holes, are filled from the least important one if all of them need too many wedges.
-    while others is not None and kept and count_least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
+    most = 0 if coarse else _WEDGES
+    while others is not None and kept and count_least_pieces(kept) > most and not _is_near(kept[-1], others):
         kept.pop()
     pieces = _bore_holes(outlines, kept, flats)
     while pieces is None and kept:
@@ -89,8 +96,9 @@ def cut_solid(raw: RawSolid, others: Array | None = None) -> CutSolid:
             f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
             "out fillets and free surfaces."
         )
-    whole, lost = _drop_crumbs(list(convert_to_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
-    return CutSolid(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept))
+    crumb = (_COARSE_CRUMB if coarse else _CRUMB) * raw.mesh.volume
+    whole, lost = _drop_crumbs(list(convert_to_cylinders(pieces, shafts)), crumb)
+    return CutSolid(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept), coarse)
 
 
 def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int]:

@@ -37,20 +37,20 @@ def _cut_flats_then_free_form(solid: Any, size: float, flats: Array, volume: flo
         size, volume: Of the whole solid.
         flats: Planes of flat faces, (k, 4).
     """
-    cuts = [_MOST_CUTS]  # cuts left, in a list because `_cut_at_reflex_edges` counts it down
-    for part in _cut_at_reflex_edges(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
+    cuts = [_MOST_CUTS]  # cuts left, in a list because `cut_at_reflex_edges` counts it down
+    for part in cut_at_reflex_edges(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
         planes = _list_reflex_planes(part.body, size)
         if not len(planes) or (
             part.body.num_tri() > _FINE_TRIANGLES and _measure_hull_excess(part) < 1e-3 * part.body.volume()
         ):
             yield part
         elif len(planes) <= _MOST_FREE_PLANES:
-            yield from _cut_at_reflex_edges(part, size, flats, False, cuts, volume)
+            yield from cut_at_reflex_edges(part, size, flats, False, cuts, volume)
         else:
-            yield from _bisect_hollow_part(part, size, volume)
+            yield from bisect_hollow_part(part, size, volume)
 
 
-def _cut_at_reflex_edges(
+def cut_at_reflex_edges(
     part: CutPart, size: float, flats: Array, only_flats: bool, cuts: list[int], volume: float
 ) -> Iterator[CutPart]:
     """Cut a part along planes of reflex edges while cuts are left, and yield what needs or allows no more cuts.
@@ -120,16 +120,17 @@ def _measure_hull_excess(part: CutPart) -> float:
     return float(part.body.hull().volume() - part.body.volume())
 
 
-def _bisect_hollow_part(part: CutPart, size: float, volume: float) -> list[CutPart]:
+def bisect_hollow_part(part: CutPart, size: float, volume: float, most: int = _MOST_BISECTED) -> list[CutPart]:
     """Bisect a hollow free-form shape until its hulls add little volume.
 
     Args:
         size, volume: Of the whole solid, for tolerances.
+        most: Largest number of parts.
     """
     body = part.body.simplify(min(1e-3 * size, 0.01)) if part.body.num_tri() > _FINE_TRIANGLES else part.body
     parts = [CutPart(each, part.planes) for each in body.decompose()]
     spare = [_measure_hull_excess(each) for each in parts]
-    while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):
+    while parts and len(parts) < most and max(spare) > _ROUGH * volume / len(parts):
         # Take the part whose hull adds most; a part that no cut improves counts as done.
         k = int(np.argmax(spare))
         low, high = np.reshape(parts[k].body.bounding_box(), (2, 3))

@@ -24,6 +24,8 @@ class SolidPlace(NamedTuple):
     T: Array
     """(4, 4), frame of the file from frame of the solid, [mm]."""
     color: Rgb | None = None
+    held: bool = False
+    """Whether a fastener that is no part of the scenario holds this copy."""
 
 
 @final

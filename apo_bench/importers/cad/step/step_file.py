@@ -1,14 +1,16 @@
 """Read a STEP file as raw solids, each shape once with the places of all copies."""
 
 import re
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.errors import InputError, require
+from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, check_size, check_triangles, read_cad_bytes
-from apo_bench.importers.cad.solids import RawSolid, merge_copies
+from apo_bench.importers.cad.solids import RawSolid, make_hull_solid, merge_copies, name_regions
 from apo_bench.importers.cad.step.from_brep import raw_of
 
 STEP_SUFFIXES = (".step", ".stp")
@@ -25,8 +27,11 @@ _UNIT_NAMES = {
 }
 
 
-def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
+def read_step(path: Path, unit: str | None, lenient: bool = False) -> tuple[CadFile, list[RawSolid]]:
     """Read the solids of a STEP file, each shape once with the places of all copies.
+
+    Args:
+        lenient: Whether the convex hull stands for a solid whose faces do not close.
 
     Raises:
         InputError: The extra is missing, the file cannot be read, or it holds no closed solid of a size for a part.
@@ -55,9 +60,15 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
         try:
             raws.append(raw_of(path, solid))
         except InputError as error:
-            if len(solids) == 1:
+            why = str(error).removeprefix(f"{path}: ")
+            if lenient:
+                corners = np.concatenate([face.corners for face in solid.faces])
+                hull = make_hull_solid(solid.name, corners, solid.places, why)
+                raws.append(replace(hull, regions=name_regions(hull.mesh, find_regions(hull.mesh))))
+            elif len(solids) == 1:
                 raise
-            left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
+            else:
+                left_out.append(f"{solid.name}: {why}")
     return CadFile(own_unit, "stated in the file", tuple(left_out)), merge_copies(raws)
 
 
