@@ -91,7 +91,8 @@ def find_order(
             break
         choices = [*{each.intervals[-1]: each for each in sorted(longer, key=lambda each: each.value)}.values()]
     reached = len(choices[0].intervals)
-    choices = [_count_rest(choice, assembly, intervals) for choice in choices]
+    after_end = [_count_unexplained(each.intervals, np.inf, assembly, intervals) for each in choices]
+    choices = [each._replace(unexplained=each.unexplained + n) for each, n in zip(choices, after_end, strict=True)]
     if reached < len(assembly):  # the log may end before the last operations, if it shows no others
         choices = [each for each in choices if any(each.intervals) and not each.unexplained]
     if not choices:
@@ -180,12 +181,6 @@ def _lengthen(
     is_lost = known[-1].ends < max(each[-1].ends for each in intervals.values()) - _LOST_S
     if k in unseen or is_lost or any(each.rests[0].hidden for each in known):
         yield _Choice(choice.worth - _SKIPPED * (k not in unseen), choice.unexplained, (*choice.intervals, None))
-
-
-def _count_rest(choice: _Choice, assembly: Assembly, intervals: RestIntervals) -> _Choice:
-    """Return a choice that counts what came to rest after the last operation."""
-    more = _count_unexplained(choice.intervals, np.inf, assembly, intervals)
-    return choice._replace(unexplained=choice.unexplained + more)
 
 
 def _count_unexplained(chosen: Chosen, until: float, assembly: Assembly, intervals: RestIntervals) -> int:
