@@ -1,7 +1,7 @@
 """Import the parts of an assembly from CAD files with one common frame, with the pose of every copy."""
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
 from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
+from apo_bench.importers.assembly.posed_parts import read_posed
+from apo_bench.importers.assembly.shaving import shave_overlaps
 from apo_bench.importers.cad.fallback import import_solid_anyway
 from apo_bench.importers.cad.near_points import find_near_points
-from apo_bench.importers.cad.part_import import read_raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, read_raw_solids
+from apo_bench.importers.cad.pieces.convex_cutting import CutSolid
 from apo_bench.importers.cad.pose_file import name_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
@@ -33,6 +36,18 @@ def remove_on_failure(folder: Path) -> Iterator[Path]:
         if not existed:
             shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+class _Report:
+    """The lines of a report, each also passed on as soon as it is added."""
+
+    def __init__(self, report: Callable[[str], object]) -> None:
+        self.lines: list[str] = []
+        self._report = report
+
+    def add(self, line: str) -> None:
+        self.lines.append(line)
+        self._report(line)
 
 
 def import_parts(
@@ -67,6 +82,7 @@ def import_parts(
     )
     folder.mkdir(parents=True, exist_ok=True)
     places: dict[str, list[SolidPlace]] = {}
+    parts: dict[Path, tuple[ImportedPart, str]] = {}
     for i, ((file, raw), others) in enumerate(zip(kept, find_near_points([raw for _, raw in kept]), strict=True)):
         name = make_part_name(raw.name, places)
         foot = _find_foot(raw)
@@ -77,6 +93,7 @@ def import_parts(
         except InputError as error:
             lines.add(f"{title} is left out: {str(error).removeprefix(f'{source}: ')}")
             continue
+        parts[part.path] = part, source
         places[name] = [
             place._replace(T=place.T @ pose.at(foot), held=(i, k) in held) for k, place in enumerate(raw.places)
         ]
@@ -88,19 +105,30 @@ def import_parts(
             lines.add(f"{name}.{face} can make no contact: {why}")
     copies = name_places(places)
     require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
-    return write_places(copies, folder, ", ".join(file.name for file in files)), tuple(lines.lines)
+    poses = write_places(copies, folder, ", ".join(file.name for file in files))
+    if choices.fits == "auto":
+        _shave_parts(poses, parts, choices, lines)
+    return poses, tuple(lines.lines)
 
 
-class _Report:
-    """The lines of a report, each also passed on as soon as it is added."""
+def _shave_parts(
+    poses: Path, parts: Mapping[Path, tuple[ImportedPart, str]], choices: AssemblyChoices, lines: _Report
+) -> None:
+    """Write the parts anew that overlap others beyond their faces, with the overlaps cut off.
 
-    def __init__(self, report: Callable[[str], object]) -> None:
-        self.lines: list[str] = []
-        self._report = report
-
-    def add(self, line: str) -> None:
-        self.lines.append(line)
-        self._report(line)
+    Args:
+        parts: Part file -> the imported part, and the source that its file states.
+    """
+    shaved = shave_overlaps(read_posed(poses), choices.clearance_mm, choices.most_overlap_mm)
+    for file, pieces in shaved.pieces.items():
+        part, source = parts[file]
+        hulls = tuple(
+            replace(piece, name="") if isinstance(piece, Hull) else Hull("", piece.corners) for piece in pieces
+        )
+        cut = CutSolid(hulls, 1, tuple(part.cut.filled), coarse=True)
+        import_solid(part.raw, file.stem, file.parent, source, choices.density, pieces=cut)
+    for line in shaved.lines:
+        lines.add(line)
 
 
 _Found = list[tuple[str, RawSolid]]

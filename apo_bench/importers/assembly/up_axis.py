@@ -28,18 +28,35 @@ def new_upright_scenario(parts: Sequence[PosedPart], choices: AssemblyChoices = 
         choices.fits != "ask" or not fits,
         f"{len(fits)} pairs of parts have no play: {'; '.join(fits)}. Give fits = auto to change them so, or refuse.",
     )
+    try:
+        scenario = _try_axes(parts, choices)
+    except (NoAssemblyOrder, InputError):
+        if choices.fasteners != "clamp":
+            raise
+        # What nothing carries in the finished assembly is held by something that the file does not show.
+        scenario = _try_axes([replace(each, held=True) for each in parts], choices)
+        marked = {each.name for each in parts if each.held}
+        notes += tuple(
+            f"nothing carries '{placing.moves[0]}' at its place, and no fastener is drawn: it is taken to be fastened "
+            "there, and clamped"
+            for placing in scenario.order
+            if placing.clamped and placing.moves[0] not in marked
+        )
+    return replace(scenario, notes=(*fits, *notes, *scenario.notes))
+
+
+def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenario:
+    """Make the scenario with the stated axis up, or with z or the axis with the fewest parts that cannot be grasped."""
     up = choices.up
-    notes = (*fits, *notes)
     found: dict[str, NewScenario] = {}
     failed: dict[str, NoAssemblyOrder | InputError] = {}
     for axis in (up,) if up else _UP_AXES:
         try:
-            scenario = _try_bases(place_on_table(parts, axis), choices)
+            found[axis] = _try_bases(place_on_table(parts, axis), choices)
         except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
-        found[axis] = replace(scenario, notes=(*notes, *scenario.notes))
-        if not scenario.unfit:  # all parts can be grasped, so no other axis is tried
+        if not found[axis].unfit:  # all parts can be grasped, so no other axis is tried
             break
     if not found:
         raise next(iter(failed.values()))  # that of the first axis

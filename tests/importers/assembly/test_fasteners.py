@@ -98,7 +98,9 @@ def hanging(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plate = extrude(make_rectangle(10, 76), 0, 40, bottom="foot", top="top")
     parts = made(folder, wall=(wall, (0, 0, 0)), plate=(plate, (-15, 0, 25)))
     with pytest.raises(NoAssemblyOrder, match="nothing is below 'plate' that would carry it"):
-        new_upright_scenario(parts, UP)
+        new_upright_scenario(parts, replace(UP, fasteners="parts"))
+    (note,) = new_upright_scenario(parts, UP).notes
+    assert note.startswith("nothing carries 'plate' at its place, and no fastener is drawn")
     found = new_upright_scenario(tuple(replace(each, held=each.name == "plate") for each in parts), UP)
     write_scenario(found, folder / "own.toml", "own", "a test")
     return folder / "own.toml"
