@@ -4,7 +4,9 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
 from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
+from apo_bench.importers.assembly.misplaced import describe_misplaced
 from apo_bench.importers.assembly.posed_parts import read_posed
 from apo_bench.importers.assembly.shaving import shave_overlaps
 from apo_bench.importers.cad.fallback import import_solid_anyway
@@ -38,15 +41,28 @@ def remove_on_failure(folder: Path) -> Iterator[Path]:
         raise
 
 
+class ImportedAssembly(NamedTuple):
+    """The parts of an assembly after their import."""
+
+    poses: Path
+    """The file of poses, next to the part files."""
+    lines: tuple[str, ...]
+    """A sentence for each part, warning, face that can make no contact, and solid left out."""
+    notes: tuple[str, ...]
+    """Those of the lines that concern the whole assembly, for the scenario file."""
+
+
 class _Report:
     """The lines of a report, each also passed on as soon as it is added."""
 
     def __init__(self, report: Callable[[str], object]) -> None:
         self.lines: list[str] = []
+        self.notes: list[str] = []
         self._report = report
 
-    def add(self, line: str) -> None:
+    def add(self, line: str, is_note: bool = True) -> None:
         self.lines.append(line)
+        self.notes += [line] if is_note else []
         self._report(line)
 
 
@@ -56,7 +72,7 @@ def import_parts(
     unit: str | None = None,
     choices: AssemblyChoices = DEFAULT_CHOICES,
     report: Callable[[str], object] = bool,
-) -> tuple[Path, tuple[str, ...]]:
+) -> ImportedAssembly:
     """Write the parts of an assembly, each shape of a file once, and the place of every copy.
 
     The frame of a part is at its foot, wherever the file has its origin: a small error of an observed rotation then
@@ -66,9 +82,6 @@ def import_parts(
         files: One file of several solids, or several files with one common frame.
         unit: Unit of the files; None: as they state.
         report: Gets each line of the report as soon as it is known.
-
-    Returns:
-        The file of poses, and a sentence for each part, warning, face that can make no contact, and solid left out.
 
     Raises:
         InputError: A file cannot be read, or fewer than two solids make parts.
@@ -98,17 +111,22 @@ def import_parts(
             place._replace(T=place.T @ pose.at(foot), held=(i, k) in held) for k, place in enumerate(raw.places)
         ]
         called = f" ({title})" if raw.name != name else ""
-        lines.add(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
+        lines.add(
+            f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces", is_note=False
+        )
         for repair in part.raw.repairs:
             lines.add(f"{name}: {repair}")
         for face, why in part.refused.items():
-            lines.add(f"{name}.{face} can make no contact: {why}")
+            lines.add(f"{name}.{face} can make no contact: {why}", is_note=False)
     copies = name_places(places)
     require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
     poses = write_places(copies, folder, ", ".join(file.name for file in files))
+    for pair in combinations(read_posed(poses), 2):
+        if misplaced := describe_misplaced(*pair):
+            lines.add(misplaced)
     if choices.fits == "auto":
         _shave_parts(poses, parts, choices, lines)
-    return poses, tuple(lines.lines)
+    return ImportedAssembly(poses, tuple(lines.lines), tuple(lines.notes))
 
 
 def _shave_parts(

@@ -12,17 +12,9 @@ from typing import Any, NamedTuple
 import manifold3d
 import numpy as np
 
-from apo_bench.geometry import (
-    Array,
-    Hull,
-    Piece,
-    find_separating_axes,
-    measure_intrusion,
-    measure_intrusion_depths,
-    pose,
-    project_on_axes,
-)
+from apo_bench.geometry import Array, Hull, Piece, measure_intrusion, pose
 from apo_bench.importers.assembly.added_clearance import add_clearance, limit_depth
+from apo_bench.importers.assembly.misplaced import find_least_overlap, measure_depth
 from apo_bench.importers.assembly.posed_parts import PosedPart
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners
 from apo_bench.scenario.layout_checks import DEEP_M
@@ -87,13 +79,8 @@ def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: flo
 def _list_deep_pieces(a: PosedPart, b: PosedPart) -> Iterator[tuple[Piece, Piece]]:
     """Yield the pairs of pieces of two parts that are inside each other."""
     for p in a.solid.pieces:
-        if _measure_depth(a, (p,), b, b.solid.pieces) > DEEP_M:
-            yield from ((p, q) for q in b.solid.pieces if _measure_depth(a, (p,), b, (q,)) > DEEP_M)
-
-
-def _measure_depth(a: PosedPart, own: tuple[Piece, ...], b: PosedPart, other: tuple[Piece, ...]) -> float:
-    """Return how deep pieces of two parts are inside each other, [m]."""
-    return float(measure_intrusion_depths(own, a.T[:3, :3], a.T[None, :3, 3], other, b.T, 0.0)[0])
+        if measure_depth(a.T, (p,), b.T, b.solid.pieces) > DEEP_M:
+            yield from ((p, q) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
 
 
 def _cut_apart(
@@ -103,19 +90,9 @@ def _cut_apart(
     for (own, mine), (other, its) in (((a, p), (b, q)), ((b, q), (a, p))):
         T = pose.inverse(own.T) @ other.T
         there = Hull(its.name, pose.apply(T, its.corners))
-        n, at = _find_least_overlap(mine, there)
+        n, at = find_least_overlap(mine, there)
         index = next(i for i, each in enumerate(pieces[own.file]) if each.name == mine.name)
         yield _cut_piece(own, index, pieces[own.file][index], n, 1e3 * at - clearance_mm)
-
-
-def _find_least_overlap(p: Piece, q: Hull) -> tuple[Array, float]:
-    """Return the direction from p to q across which they overlap least, (3,), and where q begins along it, [m]."""
-    axes = find_separating_axes(p, np.eye(3), q, np.eye(3))
-    at_p, reach_p = project_on_axes(p, np.eye(3), axes)
-    at_q, reach_q = project_on_axes(q, np.eye(3), axes)
-    k = int((reach_p + reach_q - np.abs(at_p - at_q)).argmin())
-    sign = 1.0 if at_q[k] >= at_p[k] else -1.0
-    return sign * axes[k], float(sign * at_q[k] - reach_q[k])
 
 
 def _cut_piece(of: PosedPart, index: int, piece: Piece, n: Array, d_mm: float) -> _Cut:
