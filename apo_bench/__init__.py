@@ -21,8 +21,8 @@ __version__ = "0.1.0"
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
-gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert", max_episode_steps=200)
-gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=10_000)
+gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.limited:make_insert")
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.limited:make_assemble")
 
 _EXPORTS = MappingProxyType(
     {

@@ -175,7 +175,7 @@ def actions_of(environment: str, n: int, seed: int) -> Iterator[Any]:
         for act in (0, 0, 1, *[0] * (n - 1), 2):
             yield {"act": act, "twist": 1e-4 * rng.standard_normal(6)}
     while environment == "APOInsert-v0":
-        yield np.append(0.3 * rng.uniform(-1.0, 1.0, 6), 0.0).astype(np.float32)
+        yield (0.3 * rng.uniform(-1.0, 1.0, 6)).astype(np.float32)
 
 
 def episode_values(item: Item, off: float) -> dict[str, Any]:

@@ -40,7 +40,7 @@ BLOCKS = {
 """Pages with the summary: the folder of pictures from there, and the page with all numbers."""
 BEGIN = "<!-- written by benchmarks/headline.py -->"
 END = "<!-- until here -->"
-LEFT_OUT = ("reached", "thresholds")
+LEFT_OUT = ("final_poses", "thresholds")
 """Columns that are not kept: the poses reached are most of the size, the thresholds are those of the scenario."""
 FIDELITY = "## Fidelity"
 EARLIER = "*This section is of an earlier run than the tables above.*"

@@ -1,136 +1,105 @@
-"""Compare scripted policies in `APOInsert-v0` with the robot's own search: `python benchmarks/insertion.py SCENARIO`.
+"""Policies of `APOInsert-v0` in the same trials: `python -m benchmarks.insertion`.
 
-The last operation by a robot with a hand-eye error of 0.5 mm and 0.1 degrees, poses corrected by the default corrector.
-`straight` is the approach alone; `spiral` searches for the hole where the approach is stopped, from the observations of
-a learner. `contact-robust+spiral` runs the same trials without an environment. With `--probe` `straight` follows the
-probing of the robot, and the comparison is with `contact-robust+probe`. Trials that fail before the operation do not
-count.
+Success of each policy in each scenario, and why it fails, with the defaults of the environment: the last operation by a
+robot with a hand-eye error of 0.5 mm and 0.1 degrees. Trials that fail before the operation do not count. Results are
+appended to results/insertion.csv, trial by trial, so that the script goes on where it was ended; then it writes the
+table in docs/guide/insertion.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Callable
-from dataclasses import replace
+import csv
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-import gymnasium
-import numpy as np
+from apo_bench import TrialConfig
+from apo_bench.benchmark.analysis import Rate
+from apo_bench.envs.evaluation import REASONS, EpisodeResult, evaluate_policy
+from apo_bench.envs.policies import PROBES, insert_env
+from benchmarks.rates_by_condition import counted, table
 
-import apo_bench
-from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-
-ERROR = "hand_eye:0.5/0.1"
-PITCH_MM = 0.35  # of the spiral
-ACROSS_MM = 0.2  # along the spiral with each action
-RADIUS_MM = 2.0
-YAWED_RADIUS_MM = 1.0  # where the part is turned about the insertion axis
-YAWS_DEG = (0.0, 1.0, -1.0, 2.0, -2.0)
-STALLED = 8  # actions without progress after which the approach counts as stopped
-PATIENCE = 40  # actions without resistance for which the approach goes on alone
-DEEP_MM = 1.0  # progress after a stop that means that the hole is found
-SIDE_N = 1.9  # side force above the press at which walls hold the part
-
-
-class Straight:
-    """The approach alone."""
-
-    def __call__(self, observation: dict[str, Any]) -> Any:
-        return np.zeros(7, dtype=np.float32)
-
-
-class Spiral:
-    """A spiral across the insertion axis where the approach is stopped, as long as the part meets resistance.
-
-    The rules are those of the method `+spiral`, at 20 Hz.
-    """
-
-    def __init__(self) -> None:
-        self.best = math.inf
-        self.waited = 0
-        self.stopped: float | None = None
-        self.press = 0.0
-        self.angle = 0.0
-        self.yaw = 0
-        self.at = np.zeros(2)
-        self.turned = 0.0
-
-    def __call__(self, observation: dict[str, Any]) -> Any:
-        left = float(observation["plan"][3])
-        push = -float(observation["wrench"][2])
-        action = np.zeros(7, dtype=np.float32)
-        action[6] = -1.0 if left > 20 else 0.0
-        if self.stopped is None or left < self.stopped - DEEP_MM:
-            self.waited = 0 if left < self.best - 0.05 or self.stopped is not None else self.waited + 1
-            self.stopped = None
-            self.best = min(self.best, left)
-            if self.waited >= STALLED and left > 1.0:
-                self.stopped, self.press = left, max(push, 0.1)
-                self.waited = self.yaw = 0
-                self.angle = 0.0
-                self.at = np.zeros(2)
-            return action
-        self.waited = self.waited + 1 if push < self.press / 4 else 0
-        if 0 < self.waited < PATIENCE:
-            return action
-        r = PITCH_MM * self.angle / (2 * math.pi)
-        if r > (YAWED_RADIUS_MM if self.yaw else RADIUS_MM) or math.hypot(*observation["wrench"][:2]) > push + SIDE_N:
-            self.yaw = (self.yaw + 1) % len(YAWS_DEG)
-            self.angle = r = 0.0
-        self.angle += ACROSS_MM / max(r, 0.5)
-        r = PITCH_MM * self.angle / (2 * math.pi)
-        wanted = r * np.array([math.cos(self.angle), math.sin(self.angle)])
-        action[:2] = np.clip(wanted - self.at, -1, 1)
-        self.at = self.at + action[:2]
-        action[5] = np.clip((YAWS_DEG[self.yaw] - self.turned) / 0.5, -1, 1)
-        self.turned += 0.5 * float(action[5])
-        return action
-
-
-POLICIES: dict[str, Callable[[], Any]] = {"straight": Straight, "spiral": Spiral}
-
-
-def run_episodes(env: Any, policy: Callable[[], Any], trials: range) -> dict[int, bool]:
-    """Return the success of each trial that reaches the operation."""
-    found = {}
-    for trial in trials:
-        try:
-            observation, info = env.reset(options={"trial": trial})
-        except apo_bench.InputError:  # this trial fails before the insertion
-            continue
-        act = policy()
-        over = False
-        while not over:
-            observation, _, terminated, truncated, info = env.step(act(observation))
-            over = terminated or truncated
-        found[trial] = bool(info["success"])
-    return found
+ROOT = Path(__file__).resolve().parents[1]
+KEPT = ROOT / "benchmarks" / "results" / "insertion.csv"
+PAGE = ROOT / "docs" / "guide" / "insertion.md"
+BEGIN = "<!-- table: python -m benchmarks.insertion -->"
+END = "<!-- end of table -->"
+SCENARIOS = ("stick_in_tower", "dovetail", "peg_in_hole", "shaft_through_brackets", "l_bracket_on_plate")
+"""Nothing was tuned on the last two."""
+POLICIES = ("straight", "spiral", "searcher", "probe")
+FIRST = 300
+COLUMNS = ("scenario", "policy", "trial", "success", "reason", "code", "actions", "deepest_mm", "peak_force_n")
+NOT_BEGUN = "not begun"
+"""In place of a reason: the trial fails before the operation."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario")
-    parser.add_argument("--trials", type=int, default=10)
-    parser.add_argument("--first", type=int, default=0, help="first trial (0)")
-    parser.add_argument("--horizon", type=int, default=200, help="actions of an episode (200)")
-    parser.add_argument("--policies", nargs="+", choices=POLICIES, default=list(POLICIES))
-    parser.add_argument("--probe", action="store_true", help="probe before the insertion")
+    parser.add_argument("--scenarios", nargs="+", default=list(SCENARIOS))
+    parser.add_argument("--policies", nargs="+", default=list(POLICIES))
+    parser.add_argument("--trials", type=int, default=40, help="trials of each scenario (40)")
+    parser.add_argument("--page", action="store_true", help="write the table from the results that are there")
     given = parser.parse_args()
-    more = {"robot_error": ERROR, "horizon": given.horizon, "probe": given.probe}
-    env = gymnasium.make("APOInsert-v0", scenario=given.scenario, disable_env_checker=True, **more)
-    trials = range(given.first, given.first + given.trials)
-    right = {name: run_episodes(env, POLICIES[name], trials) for name in given.policies}
-    for name, ends in right.items():
-        print(f"{name}: {sum(ends.values())} of {len(ends)}", flush=True)
-    scene = build_scene(load_scenario(given.scenario))
-    method = "contact-robust+probe" if given.probe else "contact-robust+spiral"
-    settings = TrialConfig(given.scenario, method=method, robot_error=ERROR, fidelity="near-contact")
-    own = {trial: bool(run_trial(replace(settings, seed=trial), scene)["success"]) for trial in right[name]}
-    print(f"{method}: {sum(own.values())} of {len(own)}")
-    for name, ends in right.items():
-        won, lost = (sum(a[t] > b[t] for t in own) for a, b in ((ends, own), (own, ends)))
-        print(f"{name} but not {method}: {won}; the other way: {lost}")
+    if not given.page:
+        run(given.scenarios, given.policies, range(FIRST, FIRST + given.trials))
+    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
+    block = "\n".join([BEGIN, "", *list_lines(read_results()), "", END])
+    PAGE.write_text(before + block + rest.split(END, 1)[1], encoding="utf-8")
+    print(f"Wrote the table of {PAGE}")
+
+
+def run(scenarios: Sequence[str], policies: Sequence[str], trials: range) -> None:
+    """Append a row for each episode that is not in the results yet, trial by trial in turn over the scenarios."""
+    done = {(row["scenario"], row["policy"], int(row["trial"])) for row in read_results()}
+    envs: dict[tuple[str, bool], Any] = {}
+    for trial in trials:
+        for scenario in scenarios:
+            for policy in policies:
+                if (scenario, policy, trial) in done:
+                    continue
+                key = scenario, policy in PROBES
+                if key not in envs:
+                    envs[key] = insert_env(TrialConfig(scenario, method="contact-robust"), policy)
+                results = list(evaluate_policy(envs[key], policy, [trial]))
+                write_row(scenario, policy, trial, results[0] if results else None)
+
+
+def write_row(scenario: str, policy: str, trial: int, result: EpisodeResult | None) -> None:
+    """Append an episode; one that did not begin has no success."""
+    facts = ("", NOT_BEGUN, "", "", "", "") if result is None else (int(result.success), *result[2:])
+    new = not KEPT.exists()
+    with KEPT.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if new:
+            writer.writerow(COLUMNS)
+        writer.writerow((scenario, policy, trial, *facts))
+
+
+def read_results() -> list[dict[str, str]]:
+    """Return the rows of all episodes."""
+    if not KEPT.exists():
+        return []
+    with KEPT.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def list_lines(rows: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return the table: a line for each scenario and policy, over the trials that all its policies began."""
+    heads = ("scenario", "policy", "success", *REASONS)
+    lines: list[list[object]] = []
+    for scenario in SCENARIOS:
+        here = [row for row in rows if row["scenario"] == scenario]
+        policies = [name for name in POLICIES if any(row["policy"] == name for row in here)]
+        began = [{row["trial"] for row in here if row["policy"] == name and row["success"]} for name in policies]
+        paired = set.intersection(*began) if began else set()
+        for name in policies:
+            mine = [row for row in here if row["policy"] == name and row["trial"] in paired]
+            rate = Rate(sum(row["success"] == "1" for row in mine), len(mine))
+            reasons = Counter(row["reason"] for row in mine)
+            lines.append([f"`{scenario}`", f"`{name}`", counted(rate), *(reasons[reason] for reason in REASONS)])
+    return table(heads, lines)
 
 
 if __name__ == "__main__":

@@ -99,7 +99,7 @@ def draw(covered: dict[tuple[int, int, bool], list[float]]) -> None:
             y, low, high, color=color, linewidth=1.2, label=f"{name} seeds, median {np.median(high - low):.0f}"
         )
     widths.set(xlabel="success [%]", yticks=[], title=f"{len(rows)} scores: intervals for the same number of trials")
-    widths.legend(fontsize=7)
+    widths.legend(fontsize=7, loc="lower right")
     figure.savefig(PICTURE, dpi=110, metadata={"Software": None})
 
 

@@ -1,7 +1,7 @@
 """The committed leaderboard: `python -m benchmarks.leaderboard`.
 
-Entries are those of `apo-bench score METHOD --out benchmarks/entries/METHOD.json`; the same command continues an
-interrupted run. Records lie in folders beside them, which are not committed.
+Entries are those of `apo-bench score METHOD --trials 10 --out benchmarks/entries/METHOD.json`; the same command
+continues an interrupted run, and more trials can be added. Records lie in folders beside them, which are not committed.
 
 Writes docs/results/leaderboard.md with its figure, and its first ten lines into the README.
 """
@@ -46,8 +46,8 @@ def in_readme(text: str) -> str:
 
 def outcome(of: Sequence[Entry]) -> str:
     """Return how good the best methods are that do not have the true poses, and the bound, or that trials are few."""
-    if any(entry.quick for entry in of):
-        return "The entries ran with `--quick`, one trial of each condition: the intervals are wide.\n\n"
+    if any(entry.has_few_trials for entry in of):
+        return "The entries have few trials of each condition: the intervals are wide.\n\n"
     scores = {line.entry.name: line.score for line in ranked(of) if line.score is not None}
     bound = scores.pop("oracle")
     (first, best), (second, next_best) = [*scores.items()][:2]

@@ -154,8 +154,8 @@ def draw(predicted: Array, right: Array) -> None:
     reliability.set(
         xlabel="predicted success",
         ylabel="succeeded",
-        xlim=(0, 1.05),
-        ylim=(0, 1.05),
+        xlim=(0, 1.1),
+        ylim=(-0.05, 1.05),
         title="Reliability, plans per tenth",
     )
     order = np.argsort(-predicted, kind="stable")

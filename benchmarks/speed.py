@@ -229,7 +229,7 @@ def insert(scenario: str) -> float:
         env.reset(seed=seed)
     begun = time.process_time()
     for k in range(STEPS):
-        action = np.append(rng.uniform(-0.2, 0.2, 6), -1.0).astype(np.float32)  # harder pushes end an episode early
+        action = rng.uniform(-0.2, 0.2, 6).astype(np.float32)  # harder pushes end an episode early
         if any(env.step(action)[2:4]):
             env.reset(seed=k % 4)
     return STEPS / (time.process_time() - begun)

@@ -36,14 +36,14 @@ def plan_command(
     ] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
-    robot: Annotated[Path | None, make_path_option("Write tip poses, grasps and guarded motions: .json.")] = None,
+    robot_plan: Annotated[Path | None, make_path_option("Write tip poses, grasps and guarded motions: .json.")] = None,
     frames: Annotated[
         Path | None,
-        make_path_option("Base, flange and order of quaternions of --robot: .toml; default: base, tip, xyzw."),
+        make_path_option("Base, flange and order of quaternions of --robot-plan: .toml; default: base, tip, xyzw."),
     ] = None,
     ft_sensor: Annotated[
         str | None,
-        typer.Option(help="Write also the probing motions for this sensor into --robot."),
+        typer.Option(help="Write also the probing motions for this sensor into --robot-plan."),
     ] = None,
     arm: Annotated[str | None, typer.Option(help="Check whether this arm can execute the plan.")] = None,
     as_json: AsJson = False,
@@ -52,17 +52,22 @@ def plan_command(
 
     Examples:
       apo-bench inspect plan pocket_table
-      apo-bench inspect plan stick_in_tower --observation docs/seen.csv --robot robot.json
+      apo-bench inspect plan stick_in_tower --observation docs/seen.csv --robot-plan robot.json
     """
     from apo_bench import load_scenario
     from apo_bench.formats.json_forms import write_form
     from apo_bench.viz.plan_text import describe_plan, format_plan, list_plan_lines
     from apo_bench.viz.robot_form import make_robot_form
 
-    check_output(robot, "--robot", ".json")
-    belongs = {"--method": method, "--deviation-mm": deviation_mm, "--deviation-deg": deviation_deg, "--robot": robot}
+    check_output(robot_plan, "--robot-plan", ".json")
+    belongs = {
+        "--method": method,
+        "--deviation-mm": deviation_mm,
+        "--deviation-deg": deviation_deg,
+        "--robot-plan": robot_plan,
+    }
     _require_with("--observation", observation, belongs)
-    _require_with("--robot", robot, {"--frames": frames, "--ft-sensor": ft_sensor})
+    _require_with("--robot-plan", robot_plan, {"--frames": frames, "--ft-sensor": ft_sensor})
     notes: list[str] = []
     predicted_success = None
     if observation is None:
@@ -88,7 +93,7 @@ def plan_command(
             found = find_arm(arm)
             robot_frames = RobotFrames(pose.unpack(np.array([*found.base, *found.turn])))
     lines = list_plan_lines(plan, task)
-    if robot is not None:
+    if robot_plan is not None:
         form = make_robot_form(lines, plan, task, robot_frames, notes)
         if ft_sensor is not None:
             from apo_bench import build_scene
@@ -96,14 +101,14 @@ def plan_command(
 
             scene = build_scene(task, arm=arm or SETTINGS["arm"].default)
             form["probing"] = make_probing_form(plan, scene, robot_frames, ft_sensor)
-        write_form(form, robot)
+        write_form(form, robot_plan)
     if as_json:
         print_json(describe_plan(lines, task, notes) | {"predicted_success": predicted_success})
         return
     if predicted_success is not None:
         notes.insert(0, f"predicted success: {predicted_success:.2f}")
     typer.echo("\n".join([f"{task.name} {where}: mm and degrees", "", *format_plan(lines), "", *notes]).rstrip())
-    print_written(robot)
+    print_written(robot_plan)
 
 
 def _require_with(option: str, value: object, others: dict[str, Any]) -> None:

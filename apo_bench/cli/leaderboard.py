@@ -12,7 +12,7 @@ from apo_bench.io import clean, shorten_text
 def leaderboard_command(
     folder: Annotated[Path, make_path_argument("FOLDER", "Folder of entries: .json files.")],
     out: Annotated[Path, make_path_option("Write the page: .md; its figure is next to it.")],
-    secret_seed: Annotated[
+    secret_seed_hash: Annotated[
         list[str] | None,
         typer.Option(help="Hash of a secret seed of yours: mark its entries as verified; may be repeated."),
     ] = None,
@@ -21,13 +21,13 @@ def leaderboard_command(
 
     Examples:
       apo-bench leaderboard entries --out leaderboard.md
-      apo-bench leaderboard verified --secret-seed 0123456789abcdef --out leaderboard.md
+      apo-bench leaderboard verified --secret-seed-hash 0123456789abcdef --out leaderboard.md
     """
     from apo_bench.benchmark.scoring.leaderboard import read_entries, write_leaderboard
 
     check_output(out, "--out", ".md")
     entries, left_out = read_entries(folder)
-    write_leaderboard(entries, out, frozenset(secret_seed or ()))
+    write_leaderboard(entries, out, frozenset(secret_seed_hash or ()))
     for sentence in left_out:
         typer.echo(f"left out: {shorten_text(clean(sentence))}", err=True)
     typer.echo(f"{len(entries)} entries in {out}")

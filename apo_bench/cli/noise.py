@@ -1,7 +1,7 @@
 """The commands `apo-bench noise list | show | fit`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ from apo_bench.cli.shared import (
     print_text,
     print_written,
 )
+from apo_bench.errors import require, require_known
 from apo_bench.io import write_file
 from apo_bench.records import check
 
@@ -40,7 +41,7 @@ def noise_list() -> None:
     from apo_bench.viz.noise_sheet import list_models
 
     print_columns(list(list_models().items()))
-    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, or package.module:name")
+    typer.echo("\nOthers: FILE.toml of `noise fit`, empirical:FILE.csv, poses:FILE.csv, or package.module:name")
 
 
 @commands.command("show", cls=Command)
@@ -78,11 +79,20 @@ def noise_fit(
     models: Annotated[
         Path | None, make_path_option("Symmetries of the objects: models_info.json; default: that of the dataset.")
     ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(help="Scenario of the objects, whose symmetries count; needs --objects."),
+    ] = None,
+    objects: Annotated[
+        Path | None, make_path_option("Part and frame of each object, as of `recording import`: .toml.")
+    ] = None,
     scene_id: Annotated[int | None, typer.Option(help="Read this scene alone; scene_gt.json names none.")] = None,
     out: Annotated[Path | None, make_path_option("Write the noise file for --noise: .toml.")] = None,
     residuals: Annotated[Path | None, make_path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
     picture: Annotated[Path | None, make_path_option("Draw observed and fitted distributions: .png.")] = None,
-    source: Annotated[str | None, typer.Option(help="Source to name in the noise file; default: the files.")] = None,
+    source_name: Annotated[
+        str | None, typer.Option(help="Source to name in the noise file; default: the files.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Fit a noise model to a pose estimator: tails across and along the ray, outliers and misses.
@@ -101,15 +111,15 @@ def noise_fit(
     from apo_bench.viz.fit_picture import draw_fit
     from apo_bench.viz.fit_text import format_fit, list_fit_notes, make_fit_form
 
-    inputs = (estimates, truth) if models is None else (estimates, truth, models)
+    inputs = (estimates, truth, *(path for path in (models, objects) if path is not None))
     check_output(out, "--out", ".toml", inputs=inputs)
     check_output(residuals, "--residuals", ".csv", inputs=inputs)
     check_output(picture, "--picture", ".png", inputs=inputs)
     results = read_results(estimates)
     known = models or find_models_info(truth)
-    symmetries = None if known is None else read_symmetries(known)
+    symmetries = {**({} if known is None else read_symmetries(known)), **_find_own_symmetries(scenario, objects)}
     matched = match_residuals(results, read_truth(truth, results, scene_id), symmetries)
-    fitted = fit_noise(matched, _clean_line(source or f"{estimates.name} against {truth.name}"))
+    fitted = fit_noise(matched, _clean_line(source_name or f"{estimates.name} against {truth.name}"))
     form = make_fit_form(matched, fitted, compute_goodness_of_fit(matched, fitted))
     if out is not None:
         command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
@@ -122,6 +132,22 @@ def noise_fit(
         print_json(form)
     print_text("\n".join(format_fit(form)), as_json)
     print_written(out, residuals, picture, as_json=as_json)
+
+
+def _find_own_symmetries(scenario: str | None, objects: Path | None) -> Any:
+    """Return the symmetries of the objects that are parts of a scenario."""
+    from apo_bench import load_scenario
+    from apo_bench.importers.recording.object_symmetries import find_object_symmetries
+    from apo_bench.importers.recording.objects_file import read_objects
+
+    require((scenario is None) == (objects is None), "--scenario and --objects go together; add the other one.")
+    if scenario is None or objects is None:
+        return {}
+    solids = load_scenario(scenario).assembly.solids
+    named = read_objects(objects)
+    for part in named.parts:
+        require_known("part", part, solids, place=str(objects))
+    return find_object_symmetries(named, solids)
 
 
 def _clean_line(text: str) -> str:

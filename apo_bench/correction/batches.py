@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from math import ceil
+from typing import Any
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.checks.correction_checks import check_observations
 from apo_bench.correction.contact.contact import ContactCorrector
-from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
+from apo_bench.correction.correctors import correct, resolve_corrector
+from apo_bench.correction.robust.robust import RobustCorrector
 from apo_bench.errors import require
+from apo_bench.records import CORRECTOR
 
 BATCH = 150
 """Most observations that are solved together."""
@@ -17,15 +20,15 @@ _LARGEST_JACOBIANS = 96_000
 
 
 @check_arguments
-def correct_many(
-    observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
-) -> tuple[Correction, ...]:
-    """Correct many observations of one assembly in one batch: faster than `correct`, the same up to rounding.
+def correct_many(observations: Sequence[Observation], corrector: Any = CORRECTOR) -> tuple[Correction, ...]:
+    """Correct many observations of one assembly.
+
+    `contact` and `contact-robust` correct them in batches: faster than `correct`, the same up to rounding.
+    `contact-robust` then corrects observations whose test fails one by one, as other correctors do with all.
 
     Args:
         observations: Observations of the same assembly with the same start poses and play.
-        corrector: A `ContactCorrector`, or the default of `correct`, which corrects observations whose test fails one
-            by one.
+        corrector: As for `correct`.
 
     Returns:
         The corrections, in the order of the observations.
@@ -43,13 +46,16 @@ def correct_many(
             f"observation {i} is of another assembly, start or play than observation 1; "
             "correct those together that share them.",
         )
+    chosen = resolve_corrector(corrector)
+    if not isinstance(chosen, ContactCorrector | RobustCorrector):
+        return tuple(correct(observation, corrector) for observation in observations)
     # Entries of the Jacobian of one observation: three equations per contact, six unknowns per operation.
     entries = 3 * len(first.assembly.relations()) * 6 * len(first.assembly)
     most = min(BATCH, max(1, _LARGEST_JACOBIANS // max(1, entries)))
     # Batches of equal size, since a small last one takes nearly as long as others.
     size = ceil(len(observations) / ceil(len(observations) / most))
     batches = (observations[i : i + size] for i in range(0, len(observations), size))
-    return tuple(correction for some in batches for correction in corrector.together(some))
+    return tuple(correction for some in batches for correction in chosen.together(some))
 
 
 def _is_comparable(first: Observation, other: Observation) -> bool:

@@ -26,7 +26,7 @@ class APOAssemble(APOInsert):
 
     ## Rewards
     1.0 at the end if the judge finds the whole assembly correct, else 0.0. With `reward="progress"` also, in each of n
-    operations, the share of its distance, 1 / n in total.
+    operations, the share of the hole that the part enters, 1 / n in total. `force_penalty` as in `APOInsert-v0`.
 
     ## Starting State
     That of `APOInsert-v0` at the first operation.
@@ -52,6 +52,11 @@ class APOAssemble(APOInsert):
         self.share /= n
         seen = {**self.observation_space.spaces, "operation": spaces.Box(0.0, 1.0, (n,), np.float32)}  # type: ignore[attr-defined]
         self.observation_space = spaces.Dict(seen)
+
+    @property
+    def most_actions(self) -> int:
+        """Greatest number of actions of an episode."""
+        return self._horizon * len(self.scene.scenario.assembly)
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
         """Begin the next operation, or ask the judge after the last one."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
+from apo_bench.envs.actions import describe_numbers
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
@@ -100,9 +101,12 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over, or there is none; call reset().")
         if not self.action_space.contains(action):
+            given = shown(action)
+            if isinstance(action, dict):
+                given = ", ".join(f"{name!r}: {describe_numbers(each)}" for name, each in action.items())
             raise InputError(
-                f"the action {shown(action)} was given; a dict of 'act', 0 to 2, and 'twist', (6,) within 0.1 m and "
-                "0.5 rad, is allowed, as `env.action_space` says."
+                f"{given or 'an empty dict'} was given as an action; a dict is needed, with 'act', 0 (do), 1 (undo) or "
+                "2 (finish), and 'twist', an array of float64 of shape (6,) within 0.1 m and 0.5 rad per axis."
             )
         act = int(action["act"])
         self._acts += 1

@@ -2,16 +2,19 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation, Outcome, Plan, ReachedState, Snapshot, compute_placements
 from apo_bench.envs.robot import RobotSettings
+from apo_bench.envs.stated_error import RobotErrors, correlate_plan, state_relative_error
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.records import NO_ROBOT_ERROR, parse_robot_error
+from apo_bench.simulation.execution import plan_moves
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
@@ -37,33 +40,34 @@ class EpisodeStart:
     error: RobotError | None
     poses: Array
     """(n, 4, 4), the true poses of the operations, world frame, [m]."""
-    covariances: Array
-    """(n, 6, 6), stated covariance of the twist error of each part at its target, in the part's frame, [m, rad]."""
+    joint: Array
+    """(6 n, 6 n), stated covariance of the body twists of all planned poses, [m, rad]."""
+    covariance: Array
+    """(6, 6), stated covariance of the error of the held part relative to its hole at the start: shift of its front,
+    then rotation, along world axes, [m, rad]."""
 
     @property
     def reference(self) -> Array:
         """The true poses of the operations up to this one, (k + 1, 4, 4), world, [m]."""
         return self.poses[: self.start.operation + 1]
 
-    @property
-    def covariance(self) -> Array:
-        """The stated covariance of this operation, (6, 6)."""
-        return np.asarray(self.covariances[self.start.operation])
+    @cached_property
+    def _goals(self) -> tuple[tuple[str, str, Array], ...]:
+        """Each pair of a held part and a standing one, and where the held one belongs in the frame of the other."""
+        assembly = self.plan.assembly
+        k = self.start.operation
+        true = compute_placements(assembly, self.plan.start, self.poses)[k]
+        contacts = assembly.operations[k].contacts
+        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in contacts})
+        return tuple((held, there, pose.inverse(true[there]) @ true[held]) for held, there in pairs)
 
     def off(self, control: TipControl) -> Array:
         """Return the error of the part relative to its neighbours where they stand now, as `TipControl.off` does."""
-        assembly = self.plan.assembly
-        k = self.start.operation
-        operation = assembly.operations[k]
-        true = compute_placements(assembly, self.plan.start, self.poses)[k]
+        main = self.plan.assembly.operations[self.start.operation].main
         now = control.poses()
-        # for each pair of held part and standing part: where the held part belongs, as a displacement from
-        # its present pose
-        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
-        wanted = [
-            now[there] @ pose.inverse(true[there]) @ true[held] @ pose.inverse(now[held]) for held, there in pairs
-        ]
-        return control.off([T @ now[operation.main] for T in wanted])
+        return control.off(
+            [now[there] @ goal @ pose.inverse(now[held]) @ now[main] for held, there, goal in self._goals]
+        )
 
 
 class TrialStarts(NamedTuple):
@@ -101,14 +105,27 @@ class TrialStarts(NamedTuple):
         if before is not None and not before.success:
             code = before.rests_on.code
             return Outcome("judge", code, None, f"the operations before are not right: {before.rests_on.why or code}")
+        joint = _correlate(seen, made.correction, made.plan, corrector)
         return EpisodeStart(
             trial,
             start,
             made.plan,
             config.robot_error,
             simulated.layout.poses,
-            _stated(seen, made.correction, robot.assumed),
+            joint,
+            self._state_error(made.plan, start, joint, config.actions),
         )
+
+    def _state_error(self, plan: Plan, start: Start, joint: Array, actions: tuple[str, ...] = ()) -> Array:
+        """Return the stated covariance of the held part relative to its hole, (6, 6), as in `EpisodeStart`.
+
+        Args:
+            actions: The probing actions of the robot.
+        """
+        sigmas = parse_robot_error(self.robot.assumed or NO_ROBOT_ERROR)
+        errors = RobotErrors(self.scene, sigmas, len(plan.target_poses))
+        moves = plan_moves(plan, self.scene, True, actions)
+        return state_relative_error(errors, plan, moves, start.operation, start.grip, joint)
 
     def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:
         """Return the start of the next operation after one is done, or the outcome that ended the trial before it."""
@@ -116,7 +133,9 @@ class TrialStarts(NamedTuple):
         start = prepare_next_start(
             begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.ft_sensor, key)
         )
-        return start if isinstance(start, Outcome) else replace(begun, start=start)
+        if isinstance(start, Outcome):
+            return start
+        return replace(begun, start=start, covariance=self._state_error(begun.plan, start, begun.joint))
 
 
 def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | None, reference: Array) -> Verdict:
@@ -130,16 +149,10 @@ def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | N
     return judge(scene.scenario.assembly.first(len(after)), ReachedState(after, final), reference, scene.criteria)
 
 
-def _stated(seen: Observation, correction: Correction | None, assumed: str | None) -> Array:
-    """Return stated covariances, (n, 6, 6): those of the correction, plus the assumed robot error without its joints.
-
-    Args:
-        assumed: The robot error as in `parse_robot_error`; None if it is unknown, which adds nothing.
-    """
-    posterior = None if correction is None else correction.covariance
-    covariance = seen.covariance if posterior is None else posterior
-    sigmas = parse_robot_error(assumed or NO_ROBOT_ERROR)
-    # Independent errors add as squares; the pads' middle is off by half the difference of the fingers.
-    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0], sigmas.sag_mm, sigmas.finger_mm / 2)
-    deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1], sigmas.base_tilt_deg)
-    return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))
+def _correlate(seen: Observation, correction: Correction | None, plan: Plan, corrector: Any) -> Array:
+    """Return the stated covariance of the body twists of all planned poses, (6 n, 6 n), [m, rad]."""
+    if corrector == "oracle":
+        return np.zeros((6 * len(plan.target_poses), 6 * len(plan.target_poses)))
+    if correction is None:
+        return correlate_plan(seen, plan.target_poses, exact=False)
+    return correlate_plan(correction.assumed or seen, plan.target_poses, exact=True)

@@ -8,7 +8,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.errors import InputError, shown
+from apo_bench.envs.actions import read_action
+from apo_bench.errors import InputError
 
 Flat = NDArray[np.float32]
 
@@ -50,14 +51,12 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         return self._flat(seen), info
 
     def step(self, action: Flat) -> tuple[Flat, float, bool, bool, dict[str, Any]]:
-        """Take a flat action; return the flat observation.
+        """Take a flat action, with its numbers clipped to -1 and 1; return the flat observation.
 
         Raises:
-            InputError: The action is not in the action space.
+            InputError: It is no array of so many finite numbers.
         """
-        given = np.asarray(action, dtype=np.float32)
-        if not self.action_space.contains(given):
-            raise InputError(f"the action {shown(action)} was given; {self._size} numbers from -1 to 1 are allowed.")
+        given = read_action(action, self._size)
         seen, reward, terminated, truncated, info = self.env.step(self._action(given))
         return self._flat(seen), float(reward), terminated, truncated, info
 

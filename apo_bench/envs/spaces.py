@@ -1,9 +1,5 @@
-"""Observation and action spaces of the environments, and the observations themselves.
+"""Observation and action spaces of `APOReplay-v0` and `APOTrack-v0`, and their observations."""
 
-The guide on insertion explains every number of the observations of `APOInsert-v0`.
-"""
-
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,9 +8,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Observation, Plan
+from apo_bench.envs.actions import describe_numbers
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 ROOM_M = 2.0
 """Bound of observed positions per axis, [m]; the position of a gross outlier is clipped to it."""
@@ -86,56 +82,11 @@ def moved(plan: Plan, action: Action, space: spaces.Space[Action]) -> Plan:
     twist = np.asarray(action, dtype=np.float64)
     if not space.contains(twist):
         raise InputError(
-            f"an action of shape {twist.shape} with numbers from {np.min(twist, initial=0):g} to "
-            f"{np.max(twist, initial=0):g} was given; shape {space.shape} within 0.1 m and 0.5 rad is "
-            "allowed, as `env.action_space` says."
+            f"{describe_numbers(twist)} was given as an action; an array of shape {space.shape}, a twist per "
+            "operation within 0.1 m and 0.5 rad per axis, is needed."
         )
     displacements = pose.exp(twist)
     done = [step.operation for step in plan.schedule]  # operation of each step
     return replace(
         plan, target_poses=plan.target_poses @ displacements, step_poses=plan.step_poses @ displacements[done]
     )
-
-
-MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)  # converts a twist from [m, rad] to [mm, deg]
-PIXELS = 96  # width and height of images
-_FAR_MM_DEG = np.repeat([500.0, 180.0], 3)  # bounds of a tip error
-_SEEN = {
-    "agent_pos": np.array([*_FAR_MM_DEG, *_FAR_MM_DEG, 100.0]),
-    "wrench": np.repeat([1000.0, 1000.0], 3),
-    "plan": np.array([1.0, 1.0, 1.0, 500.0, 500.0, 1e4, *_FAR_MM_DEG, *np.ones(7)]),
-}
-"""Name -> bound of each number of the observations of `APOInsert-v0`."""
-
-
-def insert_space(pixels: bool) -> spaces.Dict:
-    """Return the observation space of `APOInsert-v0`, with or without images."""
-    seen: dict[str, spaces.Space[Any]] = {
-        name: spaces.Box(-most.astype(np.float32), most.astype(np.float32), dtype=np.float32)
-        for name, most in _SEEN.items()
-    }
-    if pixels:
-        seen["pixels"] = spaces.Box(0, 255, (PIXELS, PIXELS, 3), np.uint8)
-    return spaces.Dict(seen)
-
-
-def insert_observation(
-    control: TipControl, covariance: Array, best: float, left: int, action: NDArray[np.float32]
-) -> dict[str, Any]:
-    """Return the present observation without images.
-
-    Args:
-        covariance: Stated covariance of the twist error of the part, (6, 6), [m, rad].
-        best: Smallest distance left along the insertion axis so far, [m].
-        left: Number of actions left.
-        action: The last action, (7,).
-    """
-    feel = control.reading
-    # distance left [mm], smallest so far [mm], time left [s]
-    way = (-1e3 * float(feel.tip[2]), 1e3 * best, PERIOD_S * left)
-    seen: dict[str, Any] = {
-        "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],
-        "wrench": feel.wrench,
-        "plan": np.concatenate([control.start.direction, way, control.sigmas(covariance) * MM_DEG, action]),
-    }
-    return {name: np.clip(seen[name], -most, most).astype(np.float32) for name, most in _SEEN.items()}

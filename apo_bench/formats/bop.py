@@ -1,19 +1,20 @@
-"""Read pose estimates in the results format of the BOP benchmark.
+"""Read and write pose estimates in the results format of the BOP benchmark.
 
 The first line is `scene_id,im_id,obj_id,score,R,t,time`. R is nine numbers row by row, t is three, separated by spaces.
 """
 
 from array import array
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import open_file
+from apo_bench.io import open_file, write_file
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")  # the first line of a results file
 _NUMBERS = 14
@@ -71,6 +72,32 @@ def read_results(path: str | Path) -> PoseRows:
     whole = cells[:, :4].astype(np.int64)
     R = cells[:, 5:14].reshape(-1, 3, 3)
     return check_rows(PoseRows(str(path), whole[:, 1:], R, cells[:, 14:17], whole[:, 0], cells[:, 4]))
+
+
+class EstimatedPose(NamedTuple):
+    """One row of a results file."""
+
+    where: tuple[int, int, int]
+    """Scene, image, object."""
+    score: float
+    T: Array
+    """(4, 4), camera from model, OpenCV axes, [m]."""
+    time_s: float
+    """Time for all estimates of the image; -1 if it was not measured."""
+
+
+def write_results(path: str | Path, estimates: Iterable[EstimatedPose]) -> None:
+    """Write a results file; numbers are exact.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    lines = [",".join(_COLUMNS)]
+    for each in estimates:
+        R = " ".join(map(repr, each.T[:3, :3].ravel().tolist()))
+        t = " ".join(map(repr, (1e3 * each.T[:3, 3]).tolist()))
+        lines.append(f"{','.join(map(str, each.where))},{float(each.score)!r},{R},{t},{float(each.time_s)!r}")
+    write_file(path, "\n".join([*lines, ""]))
 
 
 def check_rows(rows: PoseRows) -> PoseRows:

@@ -176,6 +176,12 @@ def apply(T: ArrayLike, points: ArrayLike) -> Array:
     return np.asarray(points, dtype=np.float64) @ T[:3, :3].T + T[:3, 3]
 
 
+def apply_all(T: ArrayLike, points: ArrayLike) -> Array:
+    """Points, (k, 3), transformed by each of several poses, (n, 4, 4): (n, k, 3)."""
+    T = np.asarray(T, dtype=np.float64)
+    return np.asarray(points, dtype=np.float64) @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
+
+
 def _rodrigues_coefficients(angle: Array) -> tuple[Array, Array, Array]:
     """sin(a)/a, (1-cos a)/a^2 and (a-sin a)/a^3, also at zero."""
     # Below 1e-4 two terms of each series are exact to rounding, where the quotients lose digits.

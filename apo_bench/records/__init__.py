@@ -79,7 +79,7 @@ from apo_bench.records.settings import (
 )
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
 from apo_bench.records.trial_numbers import EVALUATION_STARTS, FIRST_TRAINING_TRIAL
-from apo_bench.records.user_code import FAILURES, FOREIGN_ARMS, RESIDUALS
+from apo_bench.records.user_code import ESTIMATES, FAILURES, FOREIGN_ARMS, RESIDUALS
 
 __all__ = (
     "CODES",
@@ -88,6 +88,7 @@ __all__ = (
     "DEPTH_CAMERA",
     "DETECTED",
     "ENV_ID",
+    "ESTIMATES",
     "EVALUATION_STARTS",
     "FACE_OFFSET_MM",
     "FAILURES",

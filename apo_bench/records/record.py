@@ -184,7 +184,7 @@ class TrialRecord(_Columns, total=False):
 
     The text also states the factor by which the drive of the gripper was made stronger.
     """
-    reached: dict[str, _Pose] | None
+    final_poses: dict[str, _Pose] | None
     """Part -> its final pose: x, y, z [mm], qw, qx, qy, qz, world frame."""
     pose_error_fixed_mm: _Size | None
     """Root mean square distance of final poses from the truth, along directions that contacts fix [mm]."""
@@ -202,9 +202,9 @@ class TrialRecord(_Columns, total=False):
     """Final estimate of the error of the robot's base, at the centre of the poses [mm]."""
     base_error_estimate_deg: _Size | None
     """The same as an angle [deg]."""
-    base_error_std_mm: _Size | None
+    base_error_estimate_std_mm: _Size | None
     """Stated standard deviation of that estimate: root mean square of the vector [mm]."""
-    base_error_std_deg: _Size | None
+    base_error_estimate_std_deg: _Size | None
     """Stated standard deviation of the angle [deg]."""
     sim_time_s: _Size | None
     """Simulated time [s]."""

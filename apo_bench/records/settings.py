@@ -124,7 +124,8 @@ class TrialConfig:
     noise: Name = field(
         default=USUAL,
         metadata=about(
-            "Noise model: a name from `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name",
+            "Noise model: a name from `apo-bench noise list`, FILE.toml, empirical:FILE.csv, poses:FILE.csv (of images "
+            "of the trials), or package.module:name",
             key=True,
             axis=True,
         ),

@@ -20,10 +20,12 @@ Rates may follow the name, as in `flips:p=0.1/r=0.5`.
 """
 RESIDUALS = "empirical:"
 """Prefix of the name of a noise model that draws from a file of residuals."""
+ESTIMATES = "poses:"
+"""Prefix of a results file of a pose estimator, in place of a noise model; `::` and a noise file may follow."""
 DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
     "method": (),
     "arm": FOREIGN_ARMS,
-    "noise": (RESIDUALS, *(f"{name}:" for name in FAILURES)),
+    "noise": (RESIDUALS, ESTIMATES, *(f"{name}:" for name in FAILURES)),
     "contact_source": tuple(f"{kind}:" for kind in WRONG),
 }
 """Column -> prefixes of names with a colon that are no code."""

@@ -11,15 +11,19 @@ from apo_bench.io import SAFE_PATH, set_environment
 _VARIABLE = "MUJOCO_GL"
 _CHILDREN = {SAFE_PATH: "1"}
 """Environment while GLFW is imported, since that starts a Python process."""
-_SHADOW_TEXELS = 4096
+SHADOW_TEXELS = 4096
 """Texels of the shadow map along a side; each covers 0.4 mm on the table."""
 _SHADOW_REACH = 0.5
 """Half width of the shadow map, relative to the size of the scene."""
 
 
 @set_environment(_CHILDREN)
-def renderer(model: Any, width: int, height: int) -> Any:
+def renderer(model: Any, width: int, height: int, shadow_texels: int = SHADOW_TEXELS) -> Any:
     """MuJoCo's renderer; on Linux without a display it uses EGL, unless MUJOCO_GL is set.
+
+    Args:
+        shadow_texels: Texels along a side of the map of shadows, 0 for no shadows; without a graphics card they take
+            most of the time.
 
     Raises:
         InputError: No graphics driver can be used, or the picture is too large.
@@ -38,9 +42,11 @@ def renderer(model: Any, width: int, height: int) -> Any:
             importlib.reload(gl_context)  # MuJoCo chose when it was imported
         if gl_context.GLContext.__module__ == "mujoco.glfw" and _has_no_display():
             raise RuntimeError("there is no display")  # drawing without one, MuJoCo ends the process at the second try
-        model.vis.quality.shadowsize = _SHADOW_TEXELS
+        model.vis.quality.shadowsize = shadow_texels
         model.vis.map.shadowclip = _SHADOW_REACH
-        return mujoco.Renderer(model, height, width)
+        made = mujoco.Renderer(model, height, width)
+        made.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadow_texels > 0
+        return made
     except ValueError:
         raise
     except Exception as error:

@@ -20,7 +20,7 @@ import numpy as np
 
 from apo_bench.io import open_file
 from apo_bench.names import find_own_module
-from apo_bench.perception.observation.noise_file import find_noise_path
+from apo_bench.perception.observation.noise_file import list_noise_files
 from apo_bench.records.user_code import DATA_PREFIXES, is_user_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, find_scenario_path
@@ -35,7 +35,7 @@ def hash_input_files(
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
     Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
-    the weights of networks, and the judge's thresholds.
+    and the judge's thresholds.
 
     Args:
         source: The scenario as given to `load_scenario`.
@@ -46,7 +46,6 @@ def hash_input_files(
         **{f"part {part}": read_part(path).files for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml",),
         "arm": arm_files if isinstance(arm_files, tuple) else (arm_files,),
-        "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
     }
     return {
         "scenario": _digest_scenario(scenario, source),
@@ -57,8 +56,8 @@ def hash_input_files(
 
 def hash_noise_files(*names: str) -> dict[str, str]:
     """`noise NAME` -> 16 hexadecimal digits over the file, for noise models that are files or plugins."""
-    paths = {f"noise {name}": path for name in names if (path := find_noise_path(name)) is not None}
-    return {name: digest_files([path]) for name, path in paths.items()} | hash_user_code("noise", *names)
+    paths = {f"noise {name}": list_noise_files(name) for name in names}
+    return {name: digest_files(found) for name, found in paths.items() if found} | hash_user_code("noise", *names)
 
 
 def hash_user_code(kind: str, *names: str) -> dict[str, str]:

@@ -121,7 +121,7 @@ def fill_replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> Tr
         "least_overlap": replace_infinite(conditions.overlap),
         "penetration_mm": replace_infinite(conditions.penetration_mm),
         "placed_part_shift_mm": replace_infinite(conditions.placed_part_shift_mm),
-        "reached": _format_poses(result.reached.final),
+        "final_poses": _format_poses(result.reached.final),
         "pose_error_fixed_mm": replace_infinite(fixed),
         "pose_error_free_mm": replace_infinite(free),
         "peak_force_n": replace_infinite(result.peak_force_n),
@@ -139,8 +139,8 @@ def _fill_probing_columns(found: ProbingResult | None) -> TrialRecord:
         "probe_contacts_rejected": found.refused,
         "base_error_estimate_mm": found.mm,
         "base_error_estimate_deg": found.deg,
-        "base_error_std_mm": found.sure_mm,
-        "base_error_std_deg": found.sure_deg,
+        "base_error_estimate_std_mm": found.sure_mm,
+        "base_error_estimate_std_deg": found.sure_deg,
     }
 
 

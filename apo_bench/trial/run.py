@@ -19,6 +19,7 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.names import function_name
+from apo_bench.perception.observation.models import PoseResults, TrialKey
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
@@ -57,6 +58,7 @@ from apo_bench.trial.trial_stages import (
     demonstration_of,
     draw_robot_error,
     observe_demonstration,
+    plan_rotations,
     predicted_outcome,
     range_sensor,
     reobservations_of,
@@ -271,14 +273,25 @@ def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array
 
 
 def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, noise: Any = None) -> Noise:
-    """The noise model of a trial, or the depth camera that recorded its demonstration.
+    """The noise model of a trial, the depth camera that recorded its demonstration, or poses from images of the trial.
 
     Args:
         noise: The model in place of its name in the settings.
     """
     if settings.pose_source == DEPTH_CAMERA:
         return range_sensor(scene, simulated, settings.noise_mm)
-    return make_noise(noise or settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
+    model = make_noise(noise or settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
+    if not isinstance(model, PoseResults):
+        return model
+    shown = model.description.human_error_scale
+    require(
+        settings.human_error_scale == shown or knows_truth(settings.method),
+        f"the human error scale {settings.human_error_scale:g} was given, and the images in '{model.folder}' show "
+        f"demonstrations with {shown:g}; give that one.",
+    )
+    secret_seed = None if settings.secret_seed is None else settings.secret_seed.hash
+    key = TrialKey(settings.scenario, settings.seed, settings.clearance_mm, secret_seed)
+    return model.of_trial(key, plan_rotations(scene))
 
 
 def probing_config(

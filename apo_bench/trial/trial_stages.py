@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE, TV, REOBSERVE, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(
     12
 )
-SAG, BASE_TILT, FINGER, FT_DRIFT = range(12, 16)
+SAG, BASE_TILT, FINGER, FT_DRIFT, IMAGES = range(12, 17)
 """Random streams of a trial, one per source of randomness; renumbering them changes all trials.
 
-`ARM` is reserved. `WRENCH` is the noise of the force-torque sensor. The others from `HAND_EYE` on are the errors of the
-robot.
+`ARM` is reserved. `WRENCH` is the noise of the force-torque sensor. `IMAGES` draws the cameras and the depth noise of
+images. The others from `HAND_EYE` on are the errors of the robot.
 """
 _DRIFT_NM = 0.05
 """Drift of the torque of a force-torque sensor for 1 N of its force, [Nm]."""
@@ -134,10 +134,14 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: floa
     from apo_bench.simulation.sensor.rays import ModelRays
 
     assert simulated.images is not None, "simulate the demonstration with pose_source='depth-camera'"
+    clearance_m = 1e-3 * scene.clearance_mm
+    return RangeSensor(simulated.images.images, 1e-3 * noise_mm, plan_rotations(scene), clearance_m, ModelRays)
+
+
+def plan_rotations(scene: Scene) -> Array:
+    """The planned rotation of each target pose, (n, 3, 3), world: the nominal one at the mean yaw of the site."""
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
-    # nominal rotations at the mean yaw of the site
-    turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.nominal_poses[:, :3, :3]
-    return RangeSensor(simulated.images.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
+    return np.asarray(pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.nominal_poses[:, :3, :3])
 
 
 def observe_demonstration(

@@ -61,7 +61,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePic
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
     # the picture shows no arm, and the arm of the record may be a plugin that must not be run here
     scene = scene_of(replace(restore_settings(record, files.get(name, name)), arm=TrialConfig.arm))
-    poses = _read_poses(_read_whole_record(folder, record).get("reached"))
+    poses = _read_poses(_read_whole_record(folder, record).get("final_poses"))
     require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
     contact = _find_failed_contact(record, scene)
     image = draw_picture(scene, poses, *_SIZE, _aim_camera(scene, record, poses), _make_arrow(contact, scene, poses))

@@ -11,7 +11,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.names import resolve
 from apo_bench.perception.observation.models import Camera, Facts
 from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
-from apo_bench.perception.observation.noise_file import find_noise_path, list_presets, read_noise
+from apo_bench.perception.observation.noise_file import list_noise_files, list_presets, read_noise
 from apo_bench.perception.observation.observe import observe
 from apo_bench.scenario.scenario_file import load_scenario
 
@@ -122,5 +122,5 @@ def _resolve_model(model: Any) -> Any:
 
     Measured models and camera failures are made at noise level 1; other models stay classes or objects.
     """
-    known = isinstance(model, str) and (find_noise_path(model) is not None or model.partition(":")[0] in FAILURES)
+    known = isinstance(model, str) and (bool(list_noise_files(model)) or model.partition(":")[0] in FAILURES)
     return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

@@ -67,7 +67,7 @@ def test_a_script_without_a_guard_is_told_about_it_once(tmp_path: Path) -> None:
 def test_a_function_that_returns_the_observed_poses_is_the_method_uncorrected(table: apo_bench.RateTable) -> None:
     reached: dict[Any, list[Any]] = {}
     for record in table.records:
-        reached.setdefault(record["method"], []).append((record["noise_mm"], record["reached"]))
+        reached.setdefault(record["method"], []).append((record["noise_mm"], record["final_poses"]))
     assert sorted(reached["mine"], key=str) == sorted(reached["uncorrected"], key=str)
 
 
@@ -131,9 +131,9 @@ def test_one_trial_takes_a_scenario_and_keywords() -> None:
     scenario = apo_bench.load_scenario("block_on_block")
     own = apo_bench.run_trial(scenario, method=as_observed, **asked)
     (again,) = apo_bench.evaluate(as_observed, scenario=scenario, **{**asked, "noise_level": [(2, 1)]}, seeds=1).records
-    assert again["reached"] == own["reached"]
+    assert again["final_poses"] == own["final_poses"]
     assert (by_name["noise_mm"], by_name["noise_deg"], by_name["clearance_mm"]) == (2.0, 1.0, 0.25)
-    assert own["reached"] == by_name["reached"]
+    assert own["final_poses"] == by_name["final_poses"]
     assert own["method"].endswith(":as_observed")
     with pytest.raises(apo_bench.InputError, match="did you mean 'noise_level'"):
         apo_bench.run_trial("block_on_block", noise_lvl=1)

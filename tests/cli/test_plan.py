@@ -224,11 +224,11 @@ def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(tmp_path: 
         "--observation",
         str(ROOT / "docs" / "seen.csv"),
     ]
-    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames)]) == 0
+    assert cli.main([*seen, "--robot-plan", str(out), "--frames", str(frames)]) == 0
     found = json.loads(out.read_text(encoding="utf-8"))
     assert found["poses"]["quaternion"] == "wxyz"
     assert [step["part"] for step in found["steps"]] == ["castle1", "castle2", "stick"]
-    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames), "--ft-sensor", "joint-torque"]) == 0
+    assert cli.main([*seen, "--robot-plan", str(out), "--frames", str(frames), "--ft-sensor", "joint-torque"]) == 0
     with_probing = json.loads(out.read_text(encoding="utf-8"))
     assert with_probing.pop("probing")["sensor"]["noise_n"] == 3.5
     assert with_probing == found

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parent.parent.parent
 LOG = f"{ROOT}/docs/recording.csv --format csv --camera camera.toml"
 COMMANDS = {
     "inspect graph stick_in_tower --out graph.svg": "graph.svg",
-    f"inspect plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
+    f"inspect plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot-plan robot.json": "robot.json",
     "arm check six_axis block_on_block --layouts 1 --out arm.png": "arm.png",
     "noise fit --estimates estimates.csv --truth truth.csv --out fit.toml --residuals fit.csv --picture fit.png": (
         "fit.toml fit.csv fit.png"

@@ -51,6 +51,12 @@ def test_many_are_one_after_the_other(build: Callable[[], scenes.Scene]) -> None
     check_same(correct_many(seen, contact), [corrector(one) for one in seen])
 
 
+@pytest.mark.parametrize("method", ["contact", "paper", "snap"])
+def test_many_take_the_correctors_that_one_takes(method: str) -> None:
+    seen = draws(scenes.fixture(), 2)
+    check_same(correct_many(seen, method), [correct(one, method) for one in seen])
+
+
 def test_by_default_they_are_corrected_as_one_is() -> None:
     """Of four one has a part seen elsewhere, and one a part that was not seen."""
     plain = draws(scenes.stick_on_castles(), 4)

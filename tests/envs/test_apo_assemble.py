@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from apo_bench.envs.apo_assemble import APOAssemble
 
-STILL = np.zeros(7, dtype=np.float32)
+STILL = np.zeros(7, dtype=np.float32)  # with the number of the gripper
 OPEN = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
 
 
@@ -36,7 +36,7 @@ def test_it_passes_the_check_of_gymnasium() -> None:
 
 
 def test_where_nothing_is_wrong_the_approach_alone_assembles_all_and_so_does_a_copy() -> None:
-    env = APOAssemble(corrector="oracle", robot_error="none", reward="progress")
+    env = APOAssemble(corrector="oracle", robot_error="none", reward="progress", gripper=True)
     done, won, info = whole_episode(env, 3)
     assert (np.diff(done) >= 0).all()
     assert set(done) == {1, 2, 3}
@@ -47,7 +47,7 @@ def test_where_nothing_is_wrong_the_approach_alone_assembles_all_and_so_does_a_c
 
 
 def test_the_last_part_dropped_before_its_mouth_makes_the_whole_wrong() -> None:
-    env = APOAssemble(corrector="oracle", robot_error="none")
+    env = APOAssemble(corrector="oracle", robot_error="none", gripper=True)
     seen, _ = env.reset(options={"trial": 3})
     over = False
     while not over:

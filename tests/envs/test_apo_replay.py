@@ -102,7 +102,7 @@ def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
     assert row["success"] is True
     _check_episode(apo_bench.CorrectPoses(small, "paper"), row)
     reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in small._rendering.poses.items()}
-    assert reached == row["reached"]
+    assert reached == row["final_poses"]
 
 
 def _check_episode(env: Any, row: dict[str, Any]) -> None:

@@ -1,27 +1,117 @@
-"""Policies of APOInsert-v0: the teacher brings the part where it has to go, and knows more than the robot to do so."""
+"""Policies of APOInsert-v0: teacher, searches, and how they are evaluated."""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from apo_bench import TrialConfig
-from apo_bench.envs.policies import expert, insert_env, straight
+import gymnasium
+import numpy as np
+import pytest
+
+from apo_bench import InputError, TrialConfig
+from apo_bench.envs.apo_insert import APOInsert
+from apo_bench.envs.evaluation import evaluate_policy, find_reason
+from apo_bench.envs.policies import POLICIES, expert, insert_env, straight
+from apo_bench.envs.searcher import Searcher
+from apo_bench.envs.spiral import Spiral
+from apo_bench.names import resolve
 
 
 def test_the_teacher_goes_where_the_part_really_has_to_go() -> None:
     env = insert_env(TrialConfig("stick_in_tower", method="contact-robust", noise_mm=1.0, noise_deg=1.0))
     seen, _ = env.reset(options={"trial": 3})
     for _ in range(2):
-        seen, *_ = env.step(np.array([1, 1, -1, 0, 0, 1, -1], dtype=np.float32))
+        seen, *_ = env.step(np.array([1, 1, -1, 0, 0, 1], dtype=np.float32))
     first = env.off
+    act = expert(env)
     for _ in range(5):
-        seen, *_ = env.step(np.float32(expert(env, seen)))
+        seen, *_ = env.step(np.float32(act(seen)))
     assert np.linalg.norm(first[:2]) > 1e-3
     assert np.linalg.norm(env.off[:2]) < 0.2 * np.linalg.norm(first[:2])
     assert first[2] < env.off[2] < 0.0
-    assert straight(env, seen).tolist() == [0.0] * 7
+    assert straight(env)(seen).tolist() == [0.0] * 6
 
 
 def test_a_robot_that_is_right_by_its_settings_gets_the_usual_error_of_the_environment() -> None:
     wrong = {error: insert_env(TrialConfig("block_on_block", robot_error=error)).spec for error in ("none", "tool:1")}
     assert [spec.kwargs["robot_error"] for spec in wrong.values() if spec] == ["hand_eye:0.5/0.1", "tool:1"]
+
+
+@pytest.fixture(scope="module")
+def env() -> APOInsert:
+    made = gymnasium.make("APOInsert-v0", scenario="block_on_block", grasp="weld").unwrapped
+    assert isinstance(made, APOInsert)
+    return made
+
+
+def observe(left: float, push: float, side: tuple[float, float] = (0.0, 0.0), deviations: Any = (0.3, 0.8)) -> Any:
+    """An observation with a distance left [mm], a push back and a side force [N], and lateral deviations [mm]."""
+    plan = np.zeros(19)
+    plan[3] = left
+    plan[6:8] = deviations
+    return {"agent_pos": np.zeros(13), "wrench": np.array([*side, -push, 0, 0, 0]), "plan": plan}
+
+
+def stop(policy: Any, actions: int, **felt: Any) -> np.ndarray:
+    """The actions after the approach was stopped at 50 mm."""
+    for left in (60.0, 55.0, 50.0):
+        assert not policy(observe(left, 0.0)).any()
+    return np.array([policy(observe(50.0, 1.0, **felt)) for _ in range(actions)])
+
+
+def test_the_searcher_sweeps_the_axis_that_is_unknown_and_yields_across_the_one_that_is_known(env: APOInsert) -> None:
+    swept = 4.0 * stop(Searcher(env), 120, deviations=(0.1, 0.8))[:, :2]  # [mm]
+    assert np.ptp(swept[:, 0]) == 0.0
+    assert np.ptp(swept[:, 1]) > 2.0
+    assert np.abs(np.diff(swept, axis=0)).max() < 0.6
+    pushed = 4.0 * stop(Searcher(env), 20, deviations=(0.1, 0.8), side=(0.1, 0.0))[:, :2]
+    assert pushed[-1, 0] > 0.1
+    both = 4.0 * stop(Searcher(env), 200, deviations=(0.8, 0.8))[:, :2]
+    assert (np.ptp(both, axis=0) > 2.0).all()
+
+
+def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_on_where_it_is_stuck(env: APOInsert) -> None:
+    searcher = Searcher(env)
+    stop(searcher, 10)
+    assert [searcher(observe(48.0 - k, 0.0))[2] for k in range(8)][-1] > 0.0
+    rubbed = [searcher(observe(40.0, 0.0, side=(0.5, 0.0))) for _ in range(4)][-1]
+    assert rubbed[2] == -1.0
+    assert rubbed[0] > 0.0
+    stuck = np.array([searcher(observe(40.0, 1.0)) for _ in range(80)])
+    assert np.ptp(stuck[40:, 1]) > 0.1
+
+
+def test_the_spiral_covers_its_radius_and_goes_on_with_a_turn(env: APOInsert) -> None:
+    actions = stop(Spiral(env), 600)
+    across = 4.0 * np.hypot(*actions[:, :2].T)
+    assert across.max() == pytest.approx(2.0, abs=0.1)
+    assert {round(3.0 * turn) for turn in actions[:, 5]} >= {0, 1}
+
+
+def test_policies_are_evaluated_by_name_and_as_functions_of_the_observation(env: APOInsert) -> None:
+    (result,) = evaluate_policy(env, "straight", [3])
+    assert (result.trial, result.success, result.reason, result.code) == (3, True, "", "ok")
+    assert result.actions > 5
+
+    def back(base: APOInsert) -> Any:
+        return lambda observation: np.array([0, 0, -1.0, 0, 0, 0])
+
+    (failed,) = evaluate_policy(gymnasium.make("APOInsert-v0", corrector="oracle", horizon=2), back, [3])
+    assert (failed.success, failed.reason, failed.actions) == (False, "never entered", 2)
+    assert all(callable(resolve(name, POLICIES, "policy")) for name in POLICIES)
+    with pytest.raises(InputError, match="unknown policy 'spirl'; did you mean 'spiral'"):
+        evaluate_policy(env, "spirl", [3])
+
+
+@pytest.mark.parametrize(
+    ("info", "deepest", "truncated", "reason"),
+    [
+        ({"code": "force_stop", "success_once": False}, 5.0, False, "force"),
+        ({"code": "pushed", "success_once": True}, 50.0, False, "moved parts"),
+        ({"code": "gap", "success_once": False}, 0.2, True, "never entered"),
+        ({"code": "gap", "success_once": False}, 20.0, True, "out of time"),
+        ({"code": "gap", "success_once": False}, 20.0, False, "stopped inside"),
+    ],
+)
+def test_each_failure_has_one_reason(info: dict[str, Any], deepest: float, truncated: bool, reason: str) -> None:
+    assert find_reason(info, deepest, truncated) == reason

@@ -56,7 +56,7 @@ def row(seed: int) -> dict[str, Any]:
         **alike,
         **dict(zip(KEY, key, strict=True)),
         **ended,
-        "reached": reached,
+        "final_poses": reached,
     }
 
 

@@ -78,7 +78,7 @@ def test_a_replay_that_becomes_unstable_is_a_failure_with_its_code(change: Calla
     assert (row["success"], row["failure_code"], row["failure_operation"]) == (False, "unstable_simulation", 1)
     assert row["failure_stage"] in ("pick", "lift", "carry", "attach", "release", "depart")
     assert row["sentence"] == "the simulation became unstable in operation 1"
-    assert row["reached"] is None
+    assert row["final_poses"] is None
     assert run_trial(SETTINGS, scene(), simulated=simulated()) == before
 
 

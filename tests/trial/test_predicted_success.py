@@ -163,7 +163,7 @@ def test_below_abstain_the_arm_never_moves(
     monkeypatch.setattr(run, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     kept = row(scene, simulated, min_predicted_success=least)
     assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "predicted-success", "abstained")
-    assert (kept["sim_time_s"], kept["reached"]) == (None, None)
+    assert (kept["sim_time_s"], kept["final_poses"]) == (None, None)
     assert kept["predicted_success"] == carried_out["predicted_success"]
 
 

@@ -15,8 +15,8 @@ FELT = (
     "probe_contacts_rejected",
     "base_error_estimate_mm",
     "base_error_estimate_deg",
-    "base_error_std_mm",
-    "base_error_std_deg",
+    "base_error_estimate_std_mm",
+    "base_error_estimate_std_deg",
 )
 
 

@@ -51,5 +51,5 @@ def test_a_plan_is_the_same_whatever_is_wrong_with_the_robot_and_ends_elsewhere(
         found = row(scene, wrong)
         for column in ("failure_prediction", "gap_before_mm", "gap_after_mm", "chi_square", "corrected_operations"):
             assert found.get(column) == right.get(column)
-        assert found["reached"] != right["reached"]
+        assert found["final_poses"] != right["final_poses"]
         assert found["robot_error"] == wrong

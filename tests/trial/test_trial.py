@@ -192,7 +192,7 @@ def test_a_row_without_replay_is_a_failure_with_null_physics(
     assert (row["corrected_operations"], row["gap_after_mm"]) == ([3, 2], None)
     assert row["tried_corrections"] == [{"step": 3, "free": [3], "gap_mm": None}]
     assert row["failure_prediction"] is row["extra_steps"] is None
-    assert row["reached"] is row["sim_time_s"] is row["conditions"] is None
+    assert row["final_poses"] is row["sim_time_s"] is row["conditions"] is None
 
 
 def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedDemonstration) -> None:

@@ -160,8 +160,8 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
     }
     assert set(rollout.poses) == {AS_OBSERVED, AS_CORRECTED, AS_TRUE}
     reached = read_part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
-    assert row["reached"] is not None
-    for part, packed in row["reached"].items():
+    assert row["final_poses"] is not None
+    for part, packed in row["final_poses"].items():
         np.testing.assert_allclose(1e3 * reached[part][:3, 3], packed[:3], atol=0.01)
     assert main(["view", str(tmp_path / "run"), "--trial", "2", "--port", "0"]) == 2
 

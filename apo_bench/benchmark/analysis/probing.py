@@ -35,11 +35,11 @@ def _make_line(condition: Condition, trials: Trials) -> Line:
         "drawn_mm": drawn_mm,
         "assumed_mm": assumed_mm,
         "estimated_mm": compute_root_mean_square(trials.number("base_error_estimate_mm")),
-        "std_mm": compute_root_mean_square(trials.number("base_error_std_mm")),
+        "std_mm": compute_root_mean_square(trials.number("base_error_estimate_std_mm")),
         "drawn_deg": drawn_deg,
         "assumed_deg": assumed_deg,
         "estimated_deg": compute_root_mean_square(trials.number("base_error_estimate_deg")),
-        "std_deg": compute_root_mean_square(trials.number("base_error_std_deg")),
+        "std_deg": compute_root_mean_square(trials.number("base_error_estimate_std_deg")),
     }
 
 

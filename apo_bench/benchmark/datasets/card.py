@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -43,6 +43,10 @@ class RecordedEpisode:
     """(T,)."""
     more: Mapping[str, Any]
     """Column of the table of episodes -> its value for this episode; `success` is among them."""
+    robot: Mapping[str, Array] = field(default_factory=dict)
+    """Further fields that are no observation -> (T + 1, k), as the observations."""
+    truncated: bool = False
+    """Whether its time ran out, so that it is truncated and not terminated."""
 
 
 @final
@@ -63,9 +67,21 @@ class DatasetMetadata:
     robot: str
     env_spec: str | None = None
     """The environment as JSON, as Gymnasium writes it."""
+    robot_fields: Mapping[str, Field] = field(default_factory=dict)
+    """Further fields that are no observation."""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    """Argument of the environment -> its value, those with their default included."""
 
 
 LICENCE = "Apache-2.0"
+_CITATION = (
+    "@software{apo_bench,",
+    "  title   = {apo_bench: does a robot's replay of an observed assembly fit?},",
+    "  author  = {{The apo\\_bench authors}},",
+    f"  version = {{{__version__}}},",
+    f"  license = {{{LICENCE}}}",
+    "}",
+)
 
 
 def write_card(
@@ -88,12 +104,23 @@ def write_card(
         f"Nothing was measured on a real robot. `seed` is the number of a trial. There are {FPS} frames in a second of",
         f"simulated time. The robot is `{about.robot}`.",
         *("", f"Licence: {LICENCE}, as that of apo_bench."),
+        *(
+            "",
+            "## Splits",
+            "",
+            "All episodes are the split `train`. Their trials begin at 1000000, so that none is one of",
+        ),
+        "an evaluation, a track or a sweep, whose numbers are smaller.",
     ]
+    if about.arguments:
+        lines += ["", "## Environment", "", "| argument | value |", "|---|---|"]
+        lines += [f"| `{name}` | `{value!r}` |" for name, value in about.arguments.items()]
     for title, columns in tables.items():
         lines += ["", f"## {title}", "", "| column | size | unit | frame | what it is |", "|---|---|---|---|---|"]
         lines += [f"| `{name}` | {' | '.join(_list_cells(column))} |" for name, column in columns.items()]
         several = {name: c.names for name, c in columns.items() if isinstance(c, Field) and len(c.names) > 1}
         lines += ["", *(f"Numbers of `{name}`: {', '.join(names)}." for name, names in several.items())]
+    lines += ["", "## Citation", "", "```bibtex", *_CITATION, "```"]
     write_file(out / "README.md", "\n".join(lines) + "\n")
 
 

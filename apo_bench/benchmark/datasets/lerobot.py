@@ -74,6 +74,7 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     if apart:
         names = tuple(name for each in apart for name in fields[each].names)
         fields[_TOGETHER] = Field(names, "", "", f"{' and '.join(apart)} in one row")
+    fields |= {f"robot.{name}": field for name, field in about.robot_fields.items()}
     schema = pa.schema(  # types of the columns
         [(n, pa.float32() if len(f.names) == 1 else pa.list_(pa.float32(), len(f.names))) for n, f in fields.items()]
         + [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, (kind, _) in _OWN.items()]
@@ -127,7 +128,8 @@ def _list_columns(rollout: RecordedEpisode, episode: int, before: int, task: int
         *(rollout.rewards, last, last & bool(rollout.more["success"]), np.full(n, rollout.seed)),
         *(np.arange(n) / FPS, np.arange(n), np.full(n, episode), before + np.arange(n), np.full(n, task)),
     )
-    return {**seen, "action": rollout.actions, **dict(zip(_OWN, own, strict=True))}
+    robot = {f"robot.{name}": numbers[:-1] for name, numbers in rollout.robot.items()}
+    return {**seen, **robot, "action": rollout.actions, **dict(zip(_OWN, own, strict=True))}
 
 
 def _name_observation(name: str) -> str:

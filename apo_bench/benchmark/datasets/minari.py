@@ -19,7 +19,7 @@ from apo_bench.io import replace_file, write_file
 _OWN = {  # column -> its meaning
     "rewards": "reward of each action",
     "terminations": "whether the episode is over after the action",
-    "truncations": "never: an episode ends by itself",
+    "truncations": "whether time runs out with the action",
     "infos/success": "whether it is over and right, by the judge, before the first action and after each",
 }
 _OF_EPISODE = {  # attribute of an episode -> its meaning
@@ -83,9 +83,10 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
     }
     write_file(folder / "metadata.json", json.dumps(metadata, indent=1))
     observations = {f"observations/{name}": field for name, field in about.fields.items()}
+    robot = {f"infos/{name}": field for name, field in about.robot_fields.items()}
     where = "data/main_data.hdf5"
     tables: dict[str, dict[str, Any]] = {
-        f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN},
+        f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN, **robot},
         f"{where}: attributes of each": {**_OF_EPISODE, **about.episodes},
     }
     write_card(about, out, (episodes, right), tables)
@@ -103,9 +104,11 @@ def _write_episode(group: Any, rollout: RecordedEpisode, episode: int) -> None:
     group.create_dataset("actions", data=rollout.actions.astype(np.float32))
     group.create_dataset("rewards", data=rewards)
     over = np.arange(len(rewards) + 1) == len(rewards)  # one entry more than actions: also before the first action
-    group.create_dataset("terminations", data=over[1:])
+    group.create_dataset("terminations", data=over[1:] & (not rollout.truncated))
     group.create_dataset("infos/success", data=over & bool(rollout.more["success"]))
-    group.create_dataset("truncations", data=np.zeros(len(rewards), dtype=np.bool_))
+    group.create_dataset("truncations", data=over[1:] & rollout.truncated)
+    for name, numbers in rollout.robot.items():
+        group.create_dataset(f"infos/{name}", data=numbers.astype(np.float32))
 
 
 def _to_hdf5_type(x: Any) -> Any:

@@ -65,7 +65,7 @@ class ObservedBatch(NamedTuple):
     """(n, k, 4, 4), observed poses."""
     covariance: Array
     """(n, k, 6, 6), stated covariances."""
-    seen: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     """(n, k), whether the operation was observed."""
 
 
@@ -140,15 +140,15 @@ class Pairs:
     """n pairs of at most k operations: the observation, and the true target poses.
 
     A data set with length and index, as `torch.utils.data.DataLoader` takes it: `pairs[i]` has the entries of pair i,
-    `pairs[i:j]` those of several, as new arrays. Beyond the last operation of a pair there are identities, and `seen`
-    is False.
+    `pairs[i:j]` those of several, as new arrays. Beyond the last operation of a pair there are identities, and
+    `observed` is False.
     """
 
     poses: Array
     """(n, k, 4, 4): observed poses, world, [m]."""
     covariance: Array
     """(n, k, 6, 6): stated covariance of the error of each pose as a body twist, [m, rad]."""
-    seen: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     """(n, k): whether the operation was observed."""
     truth: Array
     """(n, k, 4, 4): poses at which every contact holds, world, [m]."""

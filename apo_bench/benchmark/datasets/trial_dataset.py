@@ -3,6 +3,7 @@
 The trials are replays, or insertions: observations and actions of a policy in `APOInsert-v0`, with the judge's verdict.
 """
 
+import inspect
 import shutil
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,14 +18,17 @@ from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEp
 from apo_bench.benchmark.datasets.episodes import convert_replays, describe_replays, record_replays, write_parquet
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
 from apo_bench.benchmark.sweeps.stop_signals import Check, stop_at_signals
-from apo_bench.envs.policies import POLICIES, insert_env
+from apo_bench.envs.apo_insert import APOInsert
+from apo_bench.envs.insertion_progress import PHASES
+from apo_bench.envs.policies import POLICIES, MakePolicy, insert_env
+from apo_bench.envs.robot_state import STATE_NAMES, read_robot_state, stack_states
 from apo_bench.errors import RAISED, InputError, missing_package, require, require_known
 from apo_bench.io import has_parquet, write_file
 from apo_bench.names import resolve
 from apo_bench.records import TrialConfig
 from apo_bench.trial.trial_stages import scene_of
 
-_FRAME = "way in"  # the frame of the insertion axis
+_FRAME = "insertion"  # the frame of the insertion axis
 
 
 def _list_names(*kinds: str) -> tuple[str, ...]:
@@ -38,31 +42,35 @@ _FIELDS: Mapping[str, Field] = MappingProxyType(  # observations and actions of 
             (*_list_names("tip", "lag"), "opening"),
             "mm, deg",
             _FRAME,
-            "front of the part and its turn less those where it is believed to end, by the encoders; what is commanded "
-            "less that; opening of a finger less half the width of the part",
+            "front of the part and its rotation less those at the estimated target, by the encoders; commanded less "
+            "measured pose; opening of a finger less half the width of the part",
         ),
         "wrench": Field(_list_names("wrench"), "N, Nm", _FRAME, "on the hand and what is in it, about the flange"),
         "plan": Field(
             (
-                "way_x",
-                "way_y",
-                "way_z",
-                "left",
-                "least_left",
-                "time_left",
-                *_list_names("sigma", "last"),
-                "last_gripper",
+                *("axis_x", "axis_y", "axis_z", "left", "least_left", "time_left"),
+                *(*_list_names("sigma"), "penalised_force", *_list_names("target")),
             ),
-            "mm, deg, s",
-            f"{_FRAME}; of the way: world",
-            "the way in; what is left of it, now and at least; time left; stated sigmas of the front; the last action",
+            "mm, deg, s, N",
+            f"{_FRAME}; of the axis: world",
+            "the insertion axis; the distance left along it, now and at least; time left; stated standard deviations "
+            "of the part relative to the hole; the force above which there is a penalty; the displacement of the tip "
+            "by the actions",
         ),
         "action": Field(
-            (*_list_names("shift"), "gripper"),
+            _list_names("target"),
             "1",
             _FRAME,
-            "shift and turn of the front, in shift_mm and turn_deg of the environment; above 0.5 the hand opens",
+            "target of the front and its rotation, in reach_mm and reach_deg of the environment; the third number is a "
+            "step along the axis, in shift_mm",
         ),
+    }
+)
+_ROBOT_FIELDS: Mapping[str, Field] = MappingProxyType(  # what is recorded but not observed
+    {
+        "tip": Field(STATE_NAMES["tip"], "m", "base of the arm", "measured pose of the tip"),
+        "tip_command": Field(STATE_NAMES["tip_command"], "m", "base of the arm", "commanded pose of the tip"),
+        "phase": Field(STATE_NAMES["phase"], "", "", ", ".join(f"{k} {name}" for k, name in enumerate(PHASES))),
     }
 )
 _OF_EPISODE: Mapping[str, str] = MappingProxyType(  # column of the table of episodes -> its meaning
@@ -85,8 +93,8 @@ def record_insertions(
 
     Args:
         trials: Trials in the order of their scenarios; at least one.
-        policy: One of `POLICIES`; or `module:function` of environment and observation; or `module:class`, of which each
-            episode makes an instance.
+        policy: One of `POLICIES`, or `module:name` of a function that makes the policy of an episode from its
+            environment.
         command: The command line that makes the data set.
         say: Called with a sentence about each trial that fails before the operation.
 
@@ -96,35 +104,41 @@ def record_insertions(
     Raises:
         InputError: There is no such policy, or the environment does not take a setting.
     """
-    act = resolve(policy, POLICIES, "policy")
-    env = insert_env(trials[0])
-    # settings, to make the environment again
-    made = ", ".join(f"{name}={x!r}" for name, x in (env.spec.kwargs if env.spec else {}).items() if name != "scenario")
+    make = resolve(policy, POLICIES, "policy")
+    env = insert_env(trials[0], policy)
+    given = env.spec.kwargs if env.spec else {}
+    defaults = {name: each.default for name, each in inspect.signature(APOInsert).parameters.items()}
+    joints = (*env.scene.arm.joints, "opening")
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
     fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
     about = DatasetMetadata(
         name="insertions",
-        summary="A robot holds a part before its mouth and is led by a policy until it lets go, in `APOInsert-v0` of "
-        f"apo_bench; the policy is `{policy}`. The environment is made with `{made}`; then "
-        "`reset(seed=seed, options={'trial': seed})` begins an episode.",
+        summary="A robot holds a part before its hole, and a policy moves the tip until the hand opens, in "
+        f"`APOInsert-v0` of apo_bench; the policy is `{policy}`. `reset(seed=seed, options={{'trial': seed}})` begins "
+        "an episode.",
         command=command,
         action=fields.pop("action"),
         fields=fields,
         episodes=_OF_EPISODE,
         robot=trials[0].arm,
         env_spec=env.spec.to_json() if env.spec and len({each.scenario for each in trials}) == 1 else None,
+        robot_fields={
+            "joints": Field(joints, "rad, m", "", "measured joint angles, and opening of a finger"),
+            **_ROBOT_FIELDS,
+        },
+        arguments={name: x for name, x in {**defaults, **given}.items() if name != "scenario"},
     )
-    return about, _run_rollouts(trials, policy, act, say)
+    return about, _run_rollouts(trials, policy, make, say)
 
 
 def _run_rollouts(
-    trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]
+    trials: Iterable[TrialConfig], policy: str, make: MakePolicy, say: Callable[[str], None]
 ) -> Iterator[RecordedEpisode]:
     """Yield the episodes; a new environment is made for each new scenario."""
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
-            env = insert_env(trial)
+            env = insert_env(trial, policy)
         try:
             seen, info = env.reset(seed=trial.seed, options={"trial": trial.seed})
         except InputError as error:
@@ -132,25 +146,29 @@ def _run_rollouts(
             continue
         scenario, k = env.scene.scenario, env.operation
         with _name_policy_errors(policy):
-            decide = act() if isinstance(act, type) else act
-        sights, actions, rewards = [seen], [], []  # observations, actions, rewards
-        over = False
+            act = make(env)
+        observations, actions, rewards = [seen], [], []
+        states = [read_robot_state(env, PHASES[0])]
+        over = truncated = False
         while not over:
             with _name_policy_errors(policy):
-                action = np.asarray(decide(env, seen), dtype=np.float64)
+                action = np.asarray(act(seen), dtype=np.float64)
             actions.append(np.clip(action, -1.0, 1.0).astype(np.float32))
             seen, reward, terminated, truncated, info = env.step(actions[-1])
             over = terminated or truncated
-            sights.append(seen)
+            observations.append(seen)
+            states.append(read_robot_state(env, info["phase"]))
             rewards.append(reward)
-        told = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
+        facts = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
         yield RecordedEpisode(
             seed=trial.seed,
             task=f"{scenario.title}: insert the part in the hand, the last one.",
-            observations={name: np.array([each[name] for each in sights]) for name in seen},
+            observations={name: np.array([each[name] for each in observations]) for name in seen},
             actions=np.array(actions),
             rewards=np.array(rewards),
-            more={**told, **{name: info[name] for name in ("success", "code", "sentence")}},
+            more={**facts, **{name: info[name] for name in ("success", "code", "sentence")}},
+            robot=stack_states(states),
+            truncated=truncated,
         )
 
 

@@ -29,6 +29,8 @@ _LARGEST_BYTES = 4_000_000
 RIGHT, WRONG, EXCLUDED = "10x"
 """Letters of trials in a condition: success, failure, or not counted since the demonstration failed."""
 LONGEST_NAME = 200
+LEAST_TRIALS = 10
+"""Trials of a condition that a score needs."""
 _TOLERANCE = 1e-6
 """Percentage points by which a score may differ, since processors round differently."""
 
@@ -124,8 +126,6 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     """The method, as records spell it."""
     command: Text
     """The command line that made the entry."""
-    quick: bool
-    """Whether it ran the few trials of `--quick`, which are no score."""
     versions: Annotated[Mapping[Name, Name], Meta(max_length=50)]
     """Versions of Python and of the packages that affect records."""
     revision: Annotated[str, Meta(pattern=r"^([0-9a-f]{7,64}(-dirty)?)?\Z")]
@@ -139,6 +139,11 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
         shown = (self.name, self.method, self.command, self.machine, *self.tracks)
         for text in (*shown, *self.versions, *self.versions.values()):
             require(not UNSHOWN.search(text), f"the text {text[:40]!r} has control characters or half letters")
+
+    @property
+    def has_few_trials(self) -> bool:
+        """Whether a condition has fewer trials than a score needs."""
+        return any(len(trials) < LEAST_TRIALS for track in self.tracks.values() for trials in track.conditions.values())
 
     @property
     def overall(self) -> tuple[float, float, float] | None:

@@ -11,7 +11,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.analysis import MeanEstimate, format_signed, pool_estimates
 from apo_bench.benchmark.analysis.paired import adjust_by_holm
 from apo_bench.benchmark.report.tables.table import Table, TableColumn
-from apo_bench.benchmark.scoring.entry import Entry, TrackScore, compare_entries, read_entry
+from apo_bench.benchmark.scoring.entry import LEAST_TRIALS, Entry, TrackScore, compare_entries, read_entry
 from apo_bench.benchmark.scoring.track import read_track, track_names
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, group_by, save_figure, use_figure_style, write_file
@@ -24,7 +24,7 @@ _STATUS = (
     "A `self-reported` entry is unverified, since anyone can draw public seeds again. The author of this table ran "
     "`verified` entries with trials of a secret seed, whose hash was published before; entrants that are not trusted "
     "ran as programs, which get observations and nothing else. `real` entries are forms of trials with a real robot. "
-    "`quick` entries ran a few trials, which are no score."
+    f"Entries with `few trials` have less than {LEAST_TRIALS} in a condition."
 )
 _SCORES = (
     "The score is the mean success rate over the tracks, in percent. The difference to `contact` is in points, over "
@@ -67,7 +67,7 @@ class Line(NamedTuple):
     @property
     def status(self) -> str:
         status = "verified" if self.verified else "self-reported"
-        return "real, " * self.entry.real + status + ", quick" * self.entry.quick
+        return "real, " * self.entry.real + status + ", few trials" * self.entry.has_few_trials
 
     @property
     def trials(self) -> int:

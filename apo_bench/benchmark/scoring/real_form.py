@@ -107,7 +107,6 @@ def _entry(
         name=name,
         method=method,
         command=command,
-        quick=False,
         versions={"apo_bench": __version__},
         revision=find_git_revision(),
         machine="real robot",

@@ -30,7 +30,7 @@ def score(
     rows: str | Path,
     *,
     name: str | None = None,
-    quick: bool = False,
+    trials: int | None = None,
     command: str = "",
     said: Callable[[Track], None] = lambda _: None,
     **how: Any,
@@ -43,7 +43,7 @@ def score(
         is
             continued.
         name: The name in tables; default: the method.
-        quick: Run a few seeds of each condition, to check that the method works.
+        trials: The first so many trials of each condition; default: all.
         command: The command line, for the entry.
         said: Called with each track before it runs.
         how: As for `run_sweep`: `workers`, `backend`, `secret_seed_file`.
@@ -64,8 +64,8 @@ def score(
         for arm in track.arms:
             folder = Path(rows) / track.name / Path(arm).stem.replace(":", "_")
             folder.parent.mkdir(parents=True, exist_ok=True)
-            made = run_sweep(track.of(method, arm, quick), folder, command=command, **how)
-            conditions |= _spell_conditions(made, track.find_trials(arm, quick))
+            made = run_sweep(track.of(method, arm, trials), folder, command=command, **how)
+            conditions |= _spell_conditions(made, track.find_trials(arm, trials))
             records += made
             run = read_run(folder)
             versions = {"python": run["python"], **run["versions"]}
@@ -75,7 +75,6 @@ def score(
         name=name,
         method=(SETTINGS["method"].spelled or str)(method),
         command=shorten_text(clean(command)),
-        quick=quick,
         versions=dict(sorted(versions.items())),
         revision=find_git_revision(),
         machine=platform.platform(),

@@ -6,7 +6,6 @@ A track is a sweep file without methods, and a table of its own:
     schema = "apo-bench/track/1"
     title = "Poses of a camera that errs by a millimetre or so"
     overall = true        # whether it counts in the score over all tracks
-    quick_trials = 1      # trials of each condition with --quick
     arms = ["six_axis"]   # one sweep for each; without it, the usual arm
 
 Every condition has other seeds, the same for every method.
@@ -43,23 +42,22 @@ class Track:
     title: str
     overall: bool
     """Whether it counts in the overall score; the others are for regression tests."""
-    quick_trials: int  # trials per condition with --quick
     arms: tuple[str, ...]
     hash: str
     """16 hexadecimal digits of a hash of the file."""
     grids: tuple[SweepConfig, ...]
     """The grids of the file; their methods are replaced by the one that is scored."""
 
-    def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepConfig, ...]:
-        """Return the grids of a method on one of the arms."""
-        trials = min(self.grids[0].trials, self.quick_trials) if quick else self.grids[0].trials
-        seed = self.grids[0].seed + self.arms.index(arm)
-        own: dict[str, Any] = {"method": (method,), "arm": arm, "seed": seed, "trials": trials}
+    def of(self, method: str, arm: str, trials: int | None = None) -> tuple[SweepConfig, ...]:
+        """Return the grids of a method on one of the arms, with at most so many trials per condition."""
+        own: dict[str, Any] = {"method": (method,), "arm": arm, "seed": self.grids[0].seed + self.arms.index(arm)}
+        if trials is not None:
+            own["trials"] = min(trials, self.grids[0].trials)
         return tuple(replace(grid, **own) for grid in self.grids)
 
-    def find_trials(self, arm: str, quick: bool = False) -> dict[int, tuple[str, int]]:
+    def find_trials(self, arm: str, trials: int | None = None) -> dict[int, tuple[str, int]]:
         """Return seed -> the condition of a trial in words, and the number of the trial in it."""
-        grids = self.of("oracle", arm, quick)
+        grids = self.of("oracle", arm, trials)
         conditions = list(list_conditions(grids))
         names = ["scenario", *(name for name in _NAMED if len({getattr(one, name) for one in conditions}) > 1)]
         words = [", ".join(_describe(one, name) for name in names) for one in conditions]
@@ -84,7 +82,6 @@ class TrackTable(FileTable, frozen=True, kw_only=True):
     schema: Literal["apo-bench/track/1"]
     title: Text
     overall: bool = True
-    quick_trials: Annotated[int, Meta(ge=1)] = 1
     # msgspec 0.22 frees the pattern of `Text` twice where it is one of several types, so one name is a plain `str`.
     arms: str | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
 
@@ -140,7 +137,6 @@ def read_track(given: str | Path) -> Track:
         name=path.stem,
         title=table.title,
         overall=table.overall,
-        quick_trials=table.quick_trials,
         arms=(table.arms,) if isinstance(table.arms, str) else table.arms,
         hash=hashlib.sha256(read_bytes(path, "track file")).hexdigest()[:_HEX],
         grids=grids,

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from apo_bench.perception.observation.noise_file import find_noise_path
+from apo_bench.perception.observation.noise_file import list_noise_files
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.scenario.parts import read_part
 from apo_bench.trial.input_files import list_user_files
@@ -30,8 +30,7 @@ def list_user_files_for_nodes(
             for part in scenario.part_files.values():
                 files.extend(read_part(part).files)
     for name in names:
-        noise = find_noise_path(name)
-        files.extend(list_user_files(name) if noise is None else (noise,))
+        files.extend(list_noise_files(name) or list_user_files(name))
     here = Path.cwd()
     whole = [Path(os.path.normpath(here / path)) for path in files]
     return {path.relative_to(here).as_posix(): path for path in whole if path.is_relative_to(here)}

@@ -71,6 +71,8 @@ class Sighting(NamedTuple):
     """Operations whose view may have been exchanged with this one, those on parts of equal shape first."""
     alike: int = 0
     """How many of these are on parts of equal shape."""
+    look: int = 0
+    """Number of the observation that this view is of; 0 is the first."""
 
 
 def swapped_with(k: int) -> int:
@@ -172,7 +174,7 @@ def _alike(earlier: Sighting, assumed: int, view: Sighting, belief: int) -> floa
         earlier, assumed: The earlier view and its belief.
         view, belief: The later view and its belief.
     """
-    if belief >= FLIPPED:
+    if belief >= FLIPPED or belief < 0:
         return float(belief == assumed)
     if not says_nothing(belief):
         return 0.0

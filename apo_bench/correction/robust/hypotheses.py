@@ -47,7 +47,7 @@ from apo_bench.correction.robust.noise_scale import (
     scale_surprise,
     scaled_test,
 )
-from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merge_views
+from apo_bench.correction.robust.views import Merged, Sightings, merge_views, views_by_state
 from apo_bench.correction.solvers import (
     compute_jacobian_rank,
     factor_noise,
@@ -74,16 +74,14 @@ class Case:
     """The first observation: its assembly, start poses and play hold for all views."""
     views: Sightings
     model: OutlierModel
-    _merged: dict[tuple[int, State, int | None], Merged] = field(default_factory=dict, init=False, repr=False)
+    _merged: dict[tuple[int, State], Merged] = field(default_factory=dict, init=False, repr=False)
 
-    def merge_views(self, k: int, state: State, exchanged: int | None = None) -> Merged:
-        """`views.merge_views` of operation k, cached; `exchanged` is the operation whose view is swapped with its
-        own.
-        """
-        key = k, state, exchanged
+    def merge_views(self, k: int, state: State) -> Merged:
+        """`views.merge_views` of operation k, cached."""
+        key = k, state
         if key not in self._merged:
-            other = None if exchanged is None else self.views[exchanged][0]
-            self._merged[key] = merge_views(self.views[k], state, self.model, other)
+            shown = views_by_state(self.views, k, state)
+            self._merged[key] = merge_views(self.views[k], state, self.model, shown)
         return self._merged[key]
 
 
@@ -294,7 +292,7 @@ def assumed_observation(case: Case, states: States) -> Observation:
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, state in enumerate(states):
-        every = case.merge_views(k, state, exchanged_with(state))
+        every = case.merge_views(k, state)
         if every.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN

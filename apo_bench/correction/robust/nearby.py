@@ -24,7 +24,7 @@ from apo_bench.correction.robust.beliefs import (
     swapped_with,
 )
 from apo_bench.correction.robust.hypotheses import UNKNOWN, Case, SolvedHypothesis
-from apo_bench.correction.robust.views import Sightings, exchanged_view, merge_views
+from apo_bench.correction.robust.views import Sightings, merge_views, views_by_state
 from apo_bench.geometry import Array, pose
 
 _MOST_READINGS = 3
@@ -89,9 +89,25 @@ def swaps(case: Case, states: States) -> Iterator[States]:
     for k in sorted(doubted):
         for i in case.views[k][0].others if states[k] else ():
             if states[i] and not (i in doubted and i < k) and (i in doubted or solids[i] is solids[k]):
-                yield change_states(
-                    states, (k, i), ((swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:]))
-                )
+                yield from _swap(case.views, states, k, i)
+
+
+def _swap(views: Sightings, states: States, k: int, i: int) -> Iterator[States]:
+    """Yield states in which operations k and i are swapped in one or several of the observations of both."""
+    common = sorted({view.look for view in views[k]} & {view.look for view in views[i]})
+    for size in range(1, len(common) + 1):
+        for looks in combinations(common, size):
+            yield change_states(
+                states,
+                (k, i),
+                [
+                    tuple(
+                        swapped_with(other) if view.look in looks else belief
+                        for view, belief in zip(views[own], states[own], strict=True)
+                    )
+                    for own, other in ((k, i), (i, k))
+                ],
+            )
 
 
 def continue_states(views: Sightings, states: States, model: OutlierModel) -> States:
@@ -99,12 +115,13 @@ def continue_states(views: Sightings, states: States, model: OutlierModel) -> St
     again.
     """
     grown = list[State]()
-    for own, state in zip(views, states, strict=True):
+    for k, (own, state) in enumerate(zip(views, states, strict=True)):
         now = state
         for j in range(len(state), len(own)):
-            exchanged = exchanged_view(views, now)
             every = [(*now, belief) for belief in dict.fromkeys((INLIER, GROSS, *now[:1])) if belief >= 0]
-            now = min(every, key=lambda one: merge_views(own[: j + 1], one, model, exchanged).surprise)
+            now = min(
+                every, key=lambda one: merge_views(own[: j + 1], one, model, views_by_state(views, k, one)).surprise
+            )
         grown.append(now)
     return tuple(grown)
 
@@ -132,7 +149,7 @@ def exchanges(case: Case, start: States) -> Iterator[States]:
     for k, state in enumerate(start):
         for i in case.views[k][0].others if state else ():
             if i > k and start[i]:
-                yield change_states(start, (k, i), ((swapped_with(i), *state[1:]), (swapped_with(k), *start[i][1:])))
+                yield from _swap(case.views, start, k, i)
 
 
 def false_together(case: Case, start: States) -> Iterator[States]:

@@ -26,7 +26,7 @@ from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_be
 from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, region_scale, scale_noise, scale_words
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import add_views, views_of
+from apo_bench.correction.robust.views import Sightings, add_views, confused_with, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
@@ -92,7 +92,7 @@ class RobustCorrector:
             baseless = infer_poses(observation, [k for k, own in enumerate(views) if not own]).baseless
             best = None if baseless else search.likeliest(best)
             first = first or search.first
-            doubted = baseless or unsure(search, best)
+            doubted = baseless or unsure(search, best, views)
             if reobserve is None or not reobserve.left or not doubted:
                 break
             views = add_views(views, reobserve(doubted), observation, model)
@@ -136,8 +136,11 @@ contact_robust = RobustCorrector()
 """The corrector `contact-robust` with its default settings."""
 
 
-def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
-    """Operations to observe again: no view is an inlier, the pose is uncertain, or another state is likely."""
+def unsure(search: Search, best: SolvedHypothesis | None, views: Sightings) -> tuple[int, ...]:
+    """Operations to observe again: no view is an inlier, the pose is uncertain, or another state is likely.
+
+    An operation that was seen where one of them was goes with it, since the two may have been swapped.
+    """
     if best is None:
         return tuple(range(search.operations))
     doubted = []
@@ -146,7 +149,7 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
         wide = C is not None and bool((np.sqrt(np.diag(C[k])) > _SURE_DEVIATION).any())
         if all(belief != INLIER for belief in state) or wide or search.share(best, k) > _SURE:
             doubted.append(k)
-    return tuple(doubted)
+    return tuple(sorted({*doubted, *confused_with(views, doubted)}))
 
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:

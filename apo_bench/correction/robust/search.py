@@ -92,6 +92,7 @@ class Search:
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
+            self._improve(self.first, self._swaps)
             self._rescale()
             return min(self._known(), key=_badness)
         best = None
@@ -256,15 +257,29 @@ class Search:
         return next(state for _, state in self._beliefs[k] if INLIER in state)
 
     def _refine(self, best: SolvedHypothesis) -> None:
+        """Improve a hypothesis by changes of single states, and by relations in place of operations."""
+        self._improve(best, self._changes)
+
+    def _improve(
+        self, best: SolvedHypothesis, changes: Callable[[SolvedHypothesis], Iterable[tuple[States, tuple[str, ...]]]]
+    ) -> None:
         """Improve a hypothesis by one change after another, until none makes it more likely or the budget is spent."""
         most = self._looked_at() + _MOST_ALTOGETHER
         while self._looked_at() < most:
-            near = [(states, best.dropped) for states in self._near(best)]
-            near += [(states, (relation,)) for states, relation in self._instead(best)]
-            better = min(self._solve(near, best.badness), key=_badness, default=best)
+            better = min(self._solve(changes(best), best.badness), key=_badness, default=best)
             if not better.badness < best.badness:
                 return
             best = better
+
+    def _changes(self, best: SolvedHypothesis) -> Iterator[tuple[States, tuple[str, ...]]]:
+        """Yield the states and dropped relations of the neighbours of a hypothesis."""
+        yield from ((states, best.dropped) for states in self._near(best))
+        yield from ((states, (relation,)) for states, relation in self._instead(best))
+
+    def _swaps(self, best: SolvedHypothesis) -> Iterator[tuple[States, tuple[str, ...]]]:
+        """Yield states that explain views which contradict another view of their operation as swapped."""
+        if any(len(state) > 1 and any(map(is_false, state)) for state in best.states):
+            yield from ((states, best.dropped) for states in swaps(self._case, best.states))
 
     def _near(self, best: SolvedHypothesis) -> Iterator[States]:
         """Yield states that differ in one view that is no inlier, in two swapped views, or in a displaced row."""

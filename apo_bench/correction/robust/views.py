@@ -71,6 +71,7 @@ def add_views(
     assembly = observation.assembly
     mains = [operation.main for operation in assembly.operations]
     before = _before(first)
+    look = 1 + max((view.look for own in views for view in own), default=-1)
     grown = list[tuple[Sighting, ...]]()
     for k, old in enumerate(views):
         if not observation.observed[k]:
@@ -81,12 +82,11 @@ def add_views(
         if model is not None and model.camera_m is not None:
             to = T[:3, :3].T @ (T[:3, 3] - np.array(model.camera_m))
             ray = to / max(float(np.linalg.norm(to)), 1e-9)
-        others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.observed[i]]
+        others = [i for i in range(len(mains)) if mains[i] != mains[k] and observation.observed[i]]
         like = [i for i in others if assembly.solids[mains[i]] is assembly.solids[mains[k]]]
         flips = find_approximate_symmetries(assembly.solids[mains[k]]).turns
         unlike = [i for i in others if i not in like]
-        pairs = ((), 0) if old else ((*like, *unlike), len(like))
-        seen = Sighting(T, observation.covariance[k], flips, before[k], ray, *pairs)
+        seen = Sighting(T, observation.covariance[k], flips, before[k], ray, (*like, *unlike), len(like), look)
         grown.append((*old, seen))
     return tuple(grown)
 
@@ -105,16 +105,14 @@ def _before(first: Observation) -> list[tuple[Array, Array] | None]:
 
 
 def merge_views(
-    views: Sequence[Sighting], state: State, model: OutlierModel, exchanged: Sighting | None = None
+    views: Sequence[Sighting], state: State, model: OutlierModel, shown: Sequence[Sighting] | None = None
 ) -> Merged:
     """Merge the views of one operation under a state.
 
     Args:
-        exchanged: The view of another operation that takes the place of a swapped view.
+        shown: The view that each belief is about, as `views_by_state` returns them; default: `views`.
     """
-    pairs = [
-        (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
-    ]
+    pairs = zip(shown or views, state, strict=True)
     assumed = [interpret_view(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
     unlikely = surprise(views, state, model)
     anywhere = log_volume(ROOM)
@@ -128,15 +126,14 @@ def merge_views(
     return Merged(goal, covariance, unlikely + length + apart)
 
 
-def exchanged_with(state: State) -> int | None:
-    """The operation with which this state swaps a view; None if it swaps none."""
-    return next((swapped_with(belief) for belief in state if belief < 0), None)
-
-
-def exchanged_view(views: Sightings, state: State) -> Sighting | None:
-    """The first view of the operation with which this state swaps a view; None if it swaps none."""
-    other = exchanged_with(state)
-    return None if other is None else views[other][0]
+def views_by_state(views: Sightings, k: int, state: State) -> tuple[Sighting, ...]:
+    """The views of operation k that its state names; in place of a swapped one, the other operation's view of that
+    observation.
+    """
+    return tuple(
+        view if belief >= 0 else next(other for other in views[swapped_with(belief)] if other.look == view.look)
+        for view, belief in zip(views[k], state, strict=False)
+    )
 
 
 def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float, State]]:
@@ -173,6 +170,17 @@ def _agree(a: Sighting, b: Sighting) -> bool:
     """Whether two views may both be inliers."""
     xi = pose.log(pose.inverse(a.goal) @ b.goal)
     return float(xi @ np.linalg.solve(a.covariance + b.covariance, xi)) < _AGREE
+
+
+def confused_with(views: Sightings, operations: Sequence[int]) -> set[int]:
+    """The operations with a view that agrees with one of the later views of some operations."""
+    return {
+        i
+        for k in operations
+        for view in views[k][1:]
+        for i in views[k][0].others
+        if any(_agree(view, other) for other in views[i])
+    }
 
 
 def _mean(views: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, float]:

@@ -1,6 +1,7 @@
 """Arrange a log: find the camera pose, the starts of parts and the order of operations, and how well they fit."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +11,15 @@ from apo_bench.geometry import Array, Solid, find_nearest_equivalent_pose, find_
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
+from apo_bench.importers.recording.identical_parts import list_matchings
 from apo_bench.importers.recording.ordering import (
+    Chosen,
     NoMatchingOrder,
     Order,
     Stated,
     end_of_operation,
     find_order,
+    list_settled,
     stated_order,
 )
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
@@ -39,7 +43,9 @@ class Arrangement(NamedTuple):
     fits: Mapping[int, ContactFit]
     """Observed operation, counted from 0 -> the misfit of its worst contact."""
     intervals: RestIntervals
-    """Rest intervals of each part from its start on, without pauses of a hand before it."""
+    """Rest intervals of each part."""
+    tracks: Mapping[str, str] = {}
+    """Part -> part whose track is its own; another one only among identical parts."""
 
     @property
     def fit(self) -> ContactFit:
@@ -52,67 +58,83 @@ class Arrangement(NamedTuple):
         return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
 
 
-def arrange(
-    intervals: RestIntervals, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
-) -> Arrangement:
-    """Find the camera pose and the order of operations for rest intervals.
+class Task(NamedTuple):
+    """The scenario of a recording, and what the user states about it."""
 
-    Args:
-        planned: Start of every part in the scenario, world, [m].
-        stated: Ends of operations and unobserved operations, as the user states them.
+    assembly: Assembly
+    planned: Poses
+    """Start of every part in the scenario, world, [m]."""
+    goals: Array
+    """(n, 4, 4), pose of the main part after each operation in the scenario, world, [m]."""
+    camera: CameraFile
+    stated: Stated
+    identical: Sequence[Sequence[str]] = ()
+    """Groups of parts whose tracks may belong to one another."""
+
+
+def arrange(intervals: RestIntervals, task: Task) -> Arrangement:
+    """Find the tracks of identical parts, the camera pose and the order of operations with which contacts fit best.
 
     Raises:
         NoMatchingOrder: The motions in the log do not match the operations.
         InputError: The camera file states no pose of the camera.
     """
     found: list[Arrangement] = []
-    failed: NoMatchingOrder | None = None
-    for solved in find_cameras(intervals, camera, planned, assembly.fixed, assembly.solids):
-        try:
-            found.append(_arrange_seen(intervals, solved, camera, assembly, planned, stated))
-        except NoMatchingOrder as error:
-            failed = failed or error
-        if found and found[-1].wrong_mm < _OTHER_IMAGE_MM:
-            break
+    failed = NoMatchingOrder("the moves of the log are not the operations of the scenario.")
+    for way in list_matchings(task.identical):
+        own = {part: way.get(part, part) for part in intervals}
+        changed = {part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()}
+        for solved in find_cameras(changed, task.camera, task.planned, task.assembly.fixed, task.assembly.solids):
+            try:
+                found.append(_arrange_seen(changed, solved, task)._replace(tracks=own))
+            except NoMatchingOrder as error:
+                failed = error
+            if found and found[-1].wrong_mm < _OTHER_IMAGE_MM:
+                break
     if not found:
-        raise failed or NoMatchingOrder("no camera pose is found.")
+        raise failed
     return min(found, key=lambda each: each.wrong_mm)
 
 
-def _arrange_seen(
-    intervals: RestIntervals, solved: CameraPose, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated
-) -> Arrangement:
-    """Find the order of operations for a camera pose; arguments as in `arrange`."""
+def _arrange_seen(intervals: RestIntervals, solved: CameraPose, task: Task) -> Arrangement:
+    """Find the order of operations for a camera pose."""
+    assembly, planned, goals, camera, stated, _ = task
     X = solved.T_world_camera
     expected = {**planned, **camera.places(planned)}
     intervals = {
         part: _image_as_planned(known, assembly.solids[part], pose.inverse(X) @ expected[part])
         for part, known in intervals.items()
     }
-    standing = {part: _since_standing(known, assembly, planned[part], X) for part, known in intervals.items()}
-    begun = {part: X @ known[0].rests[0].T for part, known in standing.items() if known}
-    start, source = find_starts(begun, camera, planned)
-    in_hand = {part: "in the hand" for part in standing if part not in begun and source[part] == "scenario"}
-    intervals = {part: standing[part] or known for part, known in intervals.items()}
+    if stated.ends:
+        order = stated_order(assembly, intervals, stated.ends)
+    else:
+        order = find_order(assembly, intervals, expected, X, stated.unseen)
+    intervals, order = _image_as_in_contact(assembly, intervals, order, expected, goals, X)
+    start, source = find_starts(intervals, order.intervals, X, task)
+    fits = {
+        k: contact_fit(
+            assembly,
+            k,
+            {**start, **_reached(assembly, intervals, order.intervals, k, X)},
+            unknown_parts(order, assembly, k),
+        )
+        for k, interval in enumerate(order.intervals)
+        if interval is not None
+    }
+    return Arrangement(solved, order, start, source, fits, intervals)
 
-    def order_all(intervals: RestIntervals) -> Order:
-        # Parts that a hand held all the time take their start from the scenario.
-        if stated.ends:
-            return stated_order(assembly, intervals, stated.ends)
-        return find_order(assembly, intervals, start, X, stated.unseen)
 
-    order = order_all(intervals)
-    imaged = _image_as_in_contact(assembly, intervals, order, start, X)
-    if imaged is not intervals:
-        intervals = imaged
-        order = order_all(intervals)
-    fits = {}
-    for k, interval in enumerate(order.intervals):
-        if interval is not None:
-            t = end_of_operation(assembly, intervals, order.intervals, k)
-            reached = {part: X @ T for part, T in find_rest_poses(intervals, t).items()}
-            fits[k] = contact_fit(assembly, k, {**start, **reached})
-    return Arrangement(solved, order, start, {**source, **in_hand}, fits, intervals)
+def _reached(assembly: Assembly, intervals: RestIntervals, chosen: Chosen, k: int, X: Array) -> Poses:
+    """Return the pose of every tracked part when observed operation k ended, world, [m]."""
+    t = end_of_operation(intervals, chosen, k)
+    poses = find_rest_poses(intervals, t, chosen[: k + 1], chosen[k + 1 :], list_settled(assembly, k))
+    return {part: X @ T for part, T in poses.items()}
+
+
+def unknown_parts(order: Order, assembly: Assembly, k: int) -> set[str]:
+    """Return the parts that were moved last, until operation k, by an operation that was not observed."""
+    last = {part: j for j, operation in enumerate(assembly.operations[: k + 1]) for part in operation.moves}
+    return {part for part, j in last.items() if order.intervals[j] is None}
 
 
 def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Array) -> tuple[RestInterval, ...]:
@@ -127,76 +149,72 @@ def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Arr
 
 
 def _image_as_in_contact(
-    assembly: Assembly, intervals: RestIntervals, order: Order, start: Poses, X: Array
-) -> RestIntervals:
-    """Return the intervals with the images of placed parts that make contact, the same intervals if all do.
+    assembly: Assembly, intervals: RestIntervals, order: Order, start: Poses, goals: Array, X: Array
+) -> tuple[RestIntervals, Order]:
+    """Return intervals with the images of placed parts that make contact, and their order.
 
-    Between frames, or while it is hidden, a part may turn so far that another image is nearer than its own.
+    Between frames, or while it is hidden, a part may turn so far that another image is nearer than its own. Of images
+    that fit alike, a part that was hidden has that which is turned least from the plan.
     """
     changed = dict(intervals)
+    chosen = order.intervals
     for k, interval in enumerate(order.intervals):
         if interval is None:
             continue
-        part = interval.part
-        known = intervals[part]
-        begins = known.index(interval)
-        t = end_of_operation(assembly, intervals, order.intervals, k)
-        reached = {**start, **{other: X @ T for other, T in find_rest_poses(changed, t).items()}}
-        # The part itself, and if it fits at none of its images, each part that it touches.
-        beside = sorted({contact.environment.part for contact in assembly.operations[k].contacts} & changed.keys())
-        for other in (part, *beside):
-            turns = find_symmetries(assembly.solids[other])
-            wrong = [contact_fit(assembly, k, {**reached, other: reached[other] @ g}).wrong_mm for g in turns]
-            best = int(np.argmin(wrong))
-            if wrong[best] < wrong[0] - _OTHER_IMAGE_MM:
-                first = begins if other == part else 0
-                turned = [each.turn(turns[best]) for each in changed[other][first:]]
-                changed[other] = (*changed[other][:first], *turned)
-                reached = {**reached, other: reached[other] @ turns[best]}
+        reached = {**start, **_reached(assembly, changed, chosen, k, X)}
+        unknown = unknown_parts(order, assembly, k)
+        # The part itself, and if it fits at none of its images, each part of its contacts.
+        faces = {face.part for contact in assembly.operations[k].contacts for face in contact}
+        for part in (interval.part, *sorted((faces & changed.keys()) - unknown - {interval.part})):
+            T = reached[part]
+            turns = find_symmetries(assembly.solids[part])
+            if part == interval.part and interval.rests[0].hidden:
+                planned = find_nearest_equivalent_pose(assembly.solids[part], T, goals[k])
+                turns = pose.inverse(T) @ planned @ turns
+            wrong = [contact_fit(assembly, k, {**reached, part: T @ g}, unknown).wrong_mm for g in turns]
+            best = int(np.argmin(wrong)) if min(wrong) < wrong[0] - _OTHER_IMAGE_MM else 0
+            if not np.allclose(turns[best], np.eye(4)):
+                first = intervals[part].index(interval) if part == interval.part else 0
+                turned = [each.turn(turns[best]) for each in changed[part][first:]]
+                changed[part] = (*changed[part][:first], *turned)
+                chosen = _same_intervals(order.intervals, intervals, changed)
+                reached = {**reached, part: T @ turns[best]}
             if min(wrong) < _OTHER_IMAGE_MM:
                 break
-    return intervals if changed == dict(intervals) else changed
+    rival = order.rival and _same_intervals(order.rival, intervals, changed)
+    return changed, Order(chosen, rival)
 
 
-def _since_standing(
-    known: Sequence[RestInterval], assembly: Assembly, planned: Array, X: Array
-) -> tuple[RestInterval, ...]:
-    """Return the rest intervals of a part from its start on; none if a hand held it in the air until its last place.
+def _same_intervals(chosen: Chosen, intervals: RestIntervals, changed: RestIntervals) -> Chosen:
+    """Return the changed intervals that take the place of chosen ones."""
+    return tuple(each and changed[each.part][intervals[each.part].index(each)] for each in chosen)
 
-    A first interval in the air is a pause of the hand. Such intervals are dropped while at least one interval remains
-    for each operation that moves the part.
 
-    Args:
-        known: The intervals of the part, in order of time.
-        planned: Start of the part in the scenario, world, [m].
-        X: (4, 4), pose of the camera in the world.
+def find_starts(intervals: RestIntervals, chosen: Chosen, X: Array, task: Task) -> tuple[Poses, Mapping[str, str]]:
+    """Return the start of every part, world, [m], and its source as in `Arrangement.start_source`.
+
+    It is the first rest that is no higher than planned, as a part in the air is held by a hand.
     """
-    part = known[0].part
-    pieces = assembly.solids[part].pieces
-    lowest = planned[2, 3] + measure_extent(pieces, planned[2, :3])[0]
-    moves = sum(operation.main == part for operation in assembly.operations)
-    for i in range(max(1, len(known) - moves)):  # keeps the first interval and one for each operation, at least
-        T = X @ known[i].rests[0].T
-        if part in assembly.fixed or T[2, 3] + measure_extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
-            return tuple(known[i:])
-    return ()
-
-
-def find_starts(observed: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses, Mapping[str, str]]:
-    """Return the start of every part, world, and its source as in `Arrangement.start_source`.
-
-    Args:
-        observed: First rest of tracked parts, world, [m].
-        planned: Start of all parts in the scenario, world, [m].
-    """
-    start = dict(planned)
-    source = dict.fromkeys(planned, "scenario")
-    for part, T in observed.items():
-        level = _level(planned[part], T)
-        start[part] = T if level is None else level
-        source[part] = "otherwise" if level is None else "seen"
-    known = camera.places(planned)
-    return {**start, **known}, {**source, **dict.fromkeys(known, "known")}  # places of the camera file take precedence
+    start = dict(task.planned)
+    source = dict.fromkeys(task.planned, "scenario")
+    for part, known in intervals.items():
+        ends = [i for i, each in enumerate(known) if each in chosen]
+        pieces = task.assembly.solids[part].pieces
+        poses = [X @ each.rests[0].T for each in known[: ends[0] if ends else None]]
+        heights = [T[2, 3] + measure_extent(pieces, T[2, :3])[0] for T in (task.planned[part], *poses)]
+        standing = [
+            T
+            for T, z in zip(poses, heights[1:], strict=True)
+            if part in task.assembly.fixed or z <= heights[0] + _HIGH_M
+        ]
+        if standing:
+            level = _level(task.planned[part], standing[0])
+            start[part] = standing[0] if level is None else level
+            source[part] = "otherwise" if level is None else "seen"
+        elif poses:
+            source[part] = "in the hand"
+    known_places = task.camera.places(task.planned)  # take precedence
+    return {**start, **known_places}, {**source, **dict.fromkeys(known_places, "known")}
 
 
 def _level(planned: Array, observed: Array) -> Array | None:

@@ -1,5 +1,6 @@
 """Measure how far the contacts of an operation are open at given poses."""
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +23,14 @@ class ContactFit(NamedTuple):
         return 1e3 * self.gap_m + float(np.degrees(self.angle_rad))
 
 
-def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
-    """Measure how far the contacts of operation k are open at poses, world, [m]."""
-    fits = [ContactFit(0.0, 0.0), *(_measure(assembly, contact, poses) for contact in assembly.operations[k].contacts)]
+def contact_fit(assembly: Assembly, k: int, poses: Poses, unknown: Collection[str] = ()) -> ContactFit:
+    """Measure how far the contacts of operation k are open at poses, world, [m].
+
+    Args:
+        unknown: Parts whose poses are not known; their contacts do not count.
+    """
+    contacts = [each for each in assembly.operations[k].contacts if not {face.part for face in each} & {*unknown}]
+    fits = [ContactFit(0.0, 0.0), *(_measure(assembly, contact, poses) for contact in contacts)]
     return ContactFit(max(fit.gap_m for fit in fits), max(fit.angle_rad for fit in fits))
 
 

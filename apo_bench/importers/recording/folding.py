@@ -36,7 +36,7 @@ class FoldedTrack(NamedTuple):
 
     track: PoseTrack
     turned: NDArray[np.bool_]
-    """(n,), frames with another image than most frames; about an axis of revolution, those turned by 3 degrees."""
+    """(n,), frames that are turned by more than 3 degrees to another image than that of most frames."""
 
 
 def find_gross(track: PoseTrack, solid: Solid) -> NDArray[np.bool_]:
@@ -65,31 +65,17 @@ def fold_track(track: PoseTrack, solid: Solid) -> FoldedTrack:
         track: Camera from part.
     """
     symmetric = find_symmetries(solid)
-    is_round = find_revolution(solid) is not None
-    n = len(track.t)
-    if len(symmetric) == 1 and not is_round:
-        return FoldedTrack(track, np.zeros(n, dtype=np.bool_))
-    R = np.array(track.T[:, :3, :3])
-    S = symmetric[:, :3, :3]
     T = np.array(track.T)
-    chosen = np.zeros(n, dtype=np.int64)
-    for i in range(1, n):
-        before = R[max(0, i - _BEFORE) : i]
-        near = before[np.einsum("aij,bij->ab", before, before).sum(axis=1).argmax()]
-        if is_round:
-            T[i] = find_nearest_equivalent_pose(solid, track.T[i], near)
-            R[i] = T[i, :3, :3]
-        else:
-            images = track.T[i, :3, :3] @ S
-            traces = np.einsum("mij,ij->m", images, near)
-            chosen[i] = int(np.argmax(traces >= traces.max() - 1e-12))
-            R[i] = images[chosen[i]]
-    if is_round:
-        about = np.einsum("nij,nij->n", T[:, :3, :3], track.T[:, :3, :3])
-        return FoldedTrack(PoseTrack(track.t, T), (about - 1.0) / 2.0 < _TURNED)
-    most = int(np.bincount(chosen).argmax())  # the image of most frames stays as it was reported
-    images = symmetric[chosen] @ pose.inverse(symmetric[most])
-    return FoldedTrack(PoseTrack(track.t, track.T @ images), chosen != most)
+    if len(symmetric) > 1 or find_revolution(solid) is not None:
+        for i in range(1, len(T)):
+            before = T[max(0, i - _BEFORE) : i]
+            near = np.einsum("aij,bij->ab", before[:, :3, :3], before[:, :3, :3]).sum(axis=1).argmax()
+            T[i] = find_nearest_equivalent_pose(solid, track.T[i], before[near])
+        images = (pose.inverse(track.T) @ T)[:, :3, :3]
+        chosen = np.einsum("nij,mij->nm", images, symmetric[:, :3, :3]).argmax(axis=1)
+        T = T @ pose.inverse(symmetric[np.bincount(chosen).argmax()])  # the image of most frames stays as reported
+    cosine = (np.einsum("nij,nij->n", T[:, :3, :3], track.T[:, :3, :3]) - 1.0) / 2.0
+    return FoldedTrack(PoseTrack(track.t, T), cosine < _TURNED)
 
 
 def list_images(solid: Solid, T: Array, turns: int = 1) -> Array:

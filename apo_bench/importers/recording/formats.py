@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import require, require_known
 from apo_bench.importers.recording.camera_file import Conventions
-from apo_bench.importers.recording.log_columns import MATRIX, LogColumn
+from apo_bench.importers.recording.log_columns import MATRIX, POSITION, LogColumn
 from apo_bench.importers.recording.log_json import read_json_tables
 from apo_bench.importers.recording.log_poses import orient, read_rows
 from apo_bench.importers.recording.log_tables import LogTable, read_text_tables
@@ -38,6 +38,7 @@ FORMATS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Name of a format -> beginnings of what files are recognised as."""
 _SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat", ".log", ".json", ".jsonl", ".npy")  # of logs in a folder
 _MATRIX_FOLDER = "ob_in_cam"  # in which FoundationPose writes one matrix for each image
+_MOST_IN_IMAGE = 50  # rows of a file for one image
 _NO_NAMES = (_MATRIX_FOLDER, "pose", "poses")  # folders that name no object
 
 
@@ -61,7 +62,7 @@ def read_log(path: str | Path, how: Conventions, form: str = "auto") -> Log:
     others = {table.form for table in tables if form != "auto" and not table.form.startswith(FORMATS[form])}
     if len(files) > 1:
         tables = _name_by_folder(tables)
-    logs = [read_rows(table, how) for table in tables if table.rows]
+    logs = [read_rows(table, how) for table in tables if table.places]
     require(logs, f"{path}: no pose stands in the log; give a log with one row per pose.")
     poses, more = orient(np.concatenate([log.T for log in logs]), how)
     rows = LogRows(
@@ -90,9 +91,9 @@ def _list_files(path: Path) -> Sequence[Path]:
 def _read_file(path: Path, how: Conventions) -> list[LogTable]:
     if path.suffix.lower() == ".npy":
         T = np.load(path, allow_pickle=False).reshape(-1, 4, 4)
-        columns = [*map(LogColumn, MATRIX), *map(LogColumn, "xyz")]
-        rows = [[*M[:3, :3].ravel(), *M[:3, 3]] for M in T.tolist() for M in [np.array(M)]]
-        return [LogTable(path, "matrices of NumPy", path.stem, columns, rows, [str(path)] * len(rows))]
+        cells = dict(zip(MATRIX + POSITION, [*T[:, :3, :3].reshape(-1, 9).T, *T[:, :3, 3].T], strict=True))
+        columns = {meaning: LogColumn(meaning) for meaning in cells}
+        return [LogTable(path, "matrices of NumPy", path.stem, columns, cells, [str(path)] * len(T))]
     if path.suffix.lower() in (".json", ".jsonl"):
         return read_json_tables(path)
     return read_text_tables(path, how.columns)
@@ -100,22 +101,21 @@ def _read_file(path: Path, how: Conventions) -> list[LogTable]:
 
 def _name_by_folder(tables: Sequence[LogTable]) -> list[LogTable]:
     """Return the tables of a folder with an object and an image for files that are named by an image, or by nothing."""
-    stems = [table.file.stem for table in tables]
-    by_image = all(stem.rpartition("_")[2].isdigit() for stem in stems) and all(
-        len(table.rows) < 50 for table in tables
-    )
-    repeated = len({*stems}) < len({table.file for table in tables})
+    numbers = [table.file.stem.rpartition("_")[2] for table in tables]
+    by_image = all(map(str.isdigit, numbers)) and all(len(table.places) < _MOST_IN_IMAGE for table in tables)
+    repeated = len({table.file.stem for table in tables}) < len({table.file for table in tables})
     named = []
-    for table, stem in zip(tables, stems, strict=True):
+    for table, number in zip(tables, numbers, strict=True):
         folder = table.file.resolve().parent
         folder = folder.parent if folder.name in _NO_NAMES else folder
-        known = {column.meaning for column in table.columns if column is not None}
-        if (by_image and len(table.rows) == 1) or (by_image and not known & {"t", "sec", "frame"}):
-            if not known & {"t", "sec", "frame"}:
-                rows = [[*row, stem.rpartition("_")[2]] for row in table.rows]
-                table = table._replace(columns=[*table.columns, LogColumn("frame")], rows=rows)
-            table = table._replace(name=folder.name)
-        elif repeated and table.name == stem:
-            table = table._replace(name=folder.name)
-        named.append(table)
+        has_time = bool(table.cells.keys() & {"t", "sec", "frame"})
+        if by_image and not has_time:
+            frames = {"frame": [number] * len(table.places)}
+            table = table._replace(
+                columns={**table.columns, "frame": LogColumn("frame")}, cells={**table.cells, **frames}
+            )
+        is_image = by_image and (len(table.places) == 1 or not has_time)
+        named.append(
+            table._replace(name=folder.name) if is_image or (repeated and table.name == table.file.stem) else table
+        )
     return named

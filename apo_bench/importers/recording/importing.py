@@ -1,24 +1,25 @@
 """Import the tracks of a log as the observation of one demonstration of a scenario."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Observation, Poses, SharedError
+from apo_bench.assembly import Assembly, Observation, SharedError
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
-from apo_bench.importers.recording.arrangement import Arrangement, arrange
+from apo_bench.importers.recording.arrangement import Arrangement, Task, arrange
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
-from apo_bench.importers.recording.folding import find_gross, fold_track, turn_as_reported
-from apo_bench.importers.recording.matching import TagOffset, list_matchings
+from apo_bench.importers.recording.folding import FoldedTrack, find_gross, fold_track, turn_as_reported
 from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
 from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
-from apo_bench.importers.recording.rest_intervals import RestIntervals, find_all_intervals
+from apo_bench.importers.recording.rest_intervals import find_all_intervals
+from apo_bench.importers.recording.rests import Rest
+from apo_bench.importers.recording.tags import TagOffset
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.perception.observation.models import (
     UNOBSERVED_DEVIATION,
@@ -41,7 +42,7 @@ class ImportedRecording:
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
     covariance: Array
-    """(n, 6, 6), of each observed pose without errors of the camera pose and adjustments, [m, rad]."""
+    """(n, 6, 6), of each observed pose without the error of the camera pose, which all share, [m, rad]."""
     tracks: Mapping[str, PoseTrack]
     """Folded track of each part, camera from part."""
     folded: Mapping[str, int]
@@ -82,54 +83,37 @@ def import_recording(
             operation.main in tracks,
             f"{file}: '{operation.main}', which operation {k} moves, is not tracked; name its id in the objects file.",
         )
-    planned = planned_starts(scenario)
     gross = {part: find_gross(track, assembly.solids[part]) for part, track in tracks.items()}
-    tracks = {part: PoseTrack(t[~gross[part]], T[~gross[part]]) for part, (t, T) in tracks.items()}
-
-    def arrange_log(intervals: RestIntervals) -> Arrangement:
-        return arrange(intervals, camera, assembly, planned, stated)
-
-    def arrange_tracks(tracks: Mapping[str, PoseTrack]) -> Arrangement:
-        folded = {part: fold_track(track, assembly.solids[part]).track for part, track in tracks.items()}
-        intervals = find_all_intervals(folded, assembly.solids)
-        if not all(intervals.values()):
-            raise NoMatchingOrder("a part never rests.")
-        return _arrange_identical(intervals, arrange_log, identical)[0]
-
-    folded = {part: fold_track(track, assembly.solids[part]) for part, track in tracks.items()}
-    intervals = find_all_intervals({part: each.track for part, each in folded.items()}, assembly.solids)
-    for part, known in intervals.items():
-        require(known, f"{file}: '{part}' never rests; give a log in which it lies still at its places.")
+    raw = {part: PoseTrack(t[~gross[part]], T[~gross[part]]) for part, (t, T) in tracks.items()}
+    layout = place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm)
+    task = Task(assembly, layout.start, layout.poses, camera, stated, identical)
     try:
-        arrangement, owned = _arrange_identical(intervals, arrange_log, identical)
+        folded, arrangement = arrange_tracks(raw, task)
     except NoMatchingOrder as error:
         raise InputError(f"{file}: {error}") from error
-    other = check_arrangement(arrangement, arrange_tracks, tracks, models or {}, file)
-    raw = tracks
-    tracks = {part: folded[own].track for part, own in owned.items()}
+    other = check_arrangement(arrangement, lambda tracks: arrange_tracks(tracks, task)[1], raw, models or {}, file)
+    owned = arrangement.tracks
+    followed = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
     chosen = arrangement.order.intervals
-    operations = tuple(observed_operation(tracks, intervals, chosen, assembly, X, k) for k in range(len(assembly)))
+    operations = tuple(observed_operation(followed, intervals, chosen, assembly, X, k) for k in range(len(assembly)))
     check_moved(intervals, operations, camera, assembly, file)
     observed = np.array([operation.rest is not None for operation in operations])
     poses = np.tile(np.eye(4), (len(operations), 1, 1))
-    # The error that differs from frame to frame averages out; the constant one is added in full.
     covariance = np.tile(np.diag(UNOBSERVED_DEVIATION**2), (len(operations), 1, 1))
     for k, (_, rest, *_) in enumerate(operations):
         if rest is not None:
             part = assembly.operations[k].main
             reported = raw[owned[part]].T[rest.first : rest.last + 1]
             poses[k] = X @ turn_as_reported(assembly.solids[part], rest.T, reported)
-            covariance[k] = rest.mean.covariance + rest_error(camera, rest.mean)
-            for offset in (offsets or {}).get(assembly.operations[k].main, ()):
-                frames = int(np.sum((offset.t >= rest.begins) & (offset.t <= rest.ends)))
-                covariance[k] += min(1.0, frames / len(rest.mean.inlier)) ** 2 * offset.covariance
+            covariance[k] = compute_rest_covariance(rest, camera, (offsets or {}).get(part, ()))
+    covariance += _adjustments(operations, assembly)
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
         poses=find_last_observed_poses(assembly, arrangement.start, poses, observed),
-        covariance=floor_covariance(covariance + _adjustments(operations, assembly)),
+        covariance=floor_covariance(covariance),
         observed=observed,
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,
@@ -141,39 +125,41 @@ def import_recording(
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
     wrong = {part: int(each.sum()) for part, each in gross.items()}
     many = tuple(
-        f"{n} of {n + len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
+        f"{n} of {len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
         for part, n in wrong.items()
-        if n > _MANY * (n + len(tracks[part].t))
+        if n > _MANY * len(tracks[part].t)
     )
-    doubts = (*other, *many, *list_doubts(tracks, intervals, arrangement, covariance, assembly))
-    return ImportedRecording(scenario, observation, arrangement, operations, covariance, tracks, turned, wrong, doubts)
+    doubts = (*other, *many, *list_doubts(followed, intervals, arrangement, covariance, assembly))
+    return ImportedRecording(
+        scenario, observation, arrangement, operations, covariance, followed, turned, wrong, doubts
+    )
 
 
-def _arrange_identical(
-    intervals: RestIntervals,
-    arrange_log: Callable[[RestIntervals], Arrangement],
-    identical: Sequence[Sequence[str]],
-) -> tuple[Arrangement, Mapping[str, str]]:
-    """Return the best arrangement of all ways in which identical parts may have their tracks, and part -> track."""
-    tried: list[tuple[Arrangement, Mapping[str, str]]] = []
-    failed: NoMatchingOrder | None = None
-    for way in list_matchings(identical):
-        own = {part: way.get(part, part) for part in intervals}
-        try:
-            changed = {
-                part: tuple(replace(each, part=part) for each in intervals[other]) for part, other in own.items()
-            }
-            tried.append((arrange_log(changed), own))
-        except NoMatchingOrder as error:
-            failed = failed or error
-    if not tried:
-        raise failed or NoMatchingOrder("the moves of the log are not the operations of the scenario.")
-    return min(tried, key=lambda each: each[0].wrong_mm)
+def arrange_tracks(tracks: Mapping[str, PoseTrack], task: Task) -> tuple[Mapping[str, FoldedTrack], Arrangement]:
+    """Return the folded tracks of parts, and their arrangement.
+
+    Raises:
+        NoMatchingOrder: A part never rests, or the motions in the log do not match the operations.
+    """
+    folded = {part: fold_track(track, task.assembly.solids[part]) for part, track in tracks.items()}
+    intervals = find_all_intervals({part: each.track for part, each in folded.items()}, task.assembly.solids)
+    for part, known in intervals.items():
+        if not known:
+            raise NoMatchingOrder(f"'{part}' never rests; give a log in which it lies still at its places.")
+    return folded, arrange(intervals, task)
 
 
-def planned_starts(scenario: Scenario) -> Poses:
-    """Return the start of every part in the scenario, world, [m]."""
-    return place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
+def compute_rest_covariance(rest: Rest, camera: CameraFile, offsets: Sequence[TagOffset] = ()) -> Array:
+    """Return the covariance of the pose of a rest, (6, 6), [m, rad].
+
+    The error that differs from frame to frame averages out; the constant one is added in full, and that of the place of
+    a tag as far as the frames of the rest are of this tag.
+    """
+    C = rest.mean.covariance + rest_error(camera, rest.mean)
+    for offset in offsets:
+        frames = int(np.sum((offset.t >= rest.begins) & (offset.t <= rest.ends)))
+        C = C + min(1.0, frames / len(rest.mean.inlier)) ** 2 * offset.covariance
+    return C
 
 
 def _adjustments(operations: Sequence[LoggedOperation], assembly: Assembly) -> Array:

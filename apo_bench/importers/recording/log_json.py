@@ -58,12 +58,14 @@ def read_json_tables(path: Path) -> list[LogTable]:
             names = tuple(sorted(fields))
             by_names.setdefault(names, []).append(([fields[name] for name in names], place))
     require(by_names, f"{path}: no pose is found: a position and an orientation, a rotation or a 4 x 4 matrix.")
-    return [
-        LogTable(
-            path, "JSON", path.stem, [find_column(name) for name in names], [r for r, _ in rows], [p for _, p in rows]
-        )
-        for names, rows in by_names.items()
-    ]
+    tables = []
+    for names, rows in by_names.items():
+        cells = zip(*(row for row, _ in rows), strict=True)
+        known = [(column, own) for name, own in zip(names, cells, strict=True) if (column := find_column(name))]
+        columns = {column.meaning: column for column, _ in known}
+        own_cells = {column.meaning: own for column, own in known}
+        tables.append(LogTable(path, "JSON", path.stem, columns, own_cells, [place for _, place in rows]))
+    return tables
 
 
 def _documents(path: Path) -> Iterator[tuple[str, Any]]:
@@ -137,7 +139,7 @@ def _pose_fields(value: Mapping[str, Any]) -> dict[str, float] | None:
     turn = next((key for key in _ROTATIONS if _size(value.get(key)) in (3, 4, 9)), None)
     if at is not None and turn is not None:
         unit = "mm" if at == "cam_t_m2c" else "m" if isinstance(value[at], dict) or at == "pose_t" else ""
-        return {**_rotation(value[turn], turn), **_position(value[at], unit)}
+        return {**_rotation(value[turn]), **_position(value[at], unit)}
     for key in _MATRICES:
         if _size(value.get(key)) in (12, 16):
             M = np.array(_numbers(value[key]))[:12].reshape(3, 4)
@@ -149,39 +151,27 @@ def _pose_fields(value: Mapping[str, Any]) -> dict[str, float] | None:
 
 def _size(value: Any) -> int:
     """Return how many numbers a field holds; 0 if it holds anything else."""
-    numbers = _numbers(value)
-    return 0 if numbers is None else len(numbers)
+    return len(_numbers(value))
 
 
-def _numbers(value: Any) -> list[float] | None:
-    """Return the numbers of a list, of lists of lists, or of an object with x, y, z and perhaps w."""
+def _numbers(value: Any) -> list[float]:
+    """Return the numbers of a list, of lists of lists, or of an object with x, y, z and perhaps w; NaN for null."""
     if isinstance(value, dict):
-        names = [name for name in "xyzw" if name in value]
-        value = [value[name] for name in names] if len(names) >= 3 else None
-    if not isinstance(value, list):
-        return None
-    flat: list[float] = []
-    for each in value:
-        inner = _numbers(each) if isinstance(each, list) else [each]
-        if inner is None or not all(x is None or isinstance(x, int | float) for x in inner):
-            return None
-        flat += [np.nan if x is None else float(x) for x in inner]
-    return flat
+        value = [value[name] for name in "xyzw" if name in value]
+    try:
+        return np.array(value, dtype=np.float64).ravel().tolist() if isinstance(value, list) else []
+    except (TypeError, ValueError):
+        return []
 
 
 def _position(value: Any, unit: str) -> dict[str, float]:
     """Return a position as columns with a unit."""
-    numbers = _numbers(value) or []
-    return dict(zip((f"{axis}_{unit}" if unit else axis for axis in "xyz"), numbers, strict=True))
+    return dict(zip((f"{axis}_{unit}" if unit else axis for axis in "xyz"), _numbers(value), strict=True))
 
 
-def _rotation(value: Any, key: str) -> dict[str, float]:
+def _rotation(value: Any) -> dict[str, float]:
     """Return a rotation as columns: a matrix, a named quaternion, four numbers, or a rotation vector in radians."""
-    numbers = _numbers(value) or []
-    if len(numbers) == 9:
-        return dict(zip(MATRIX, numbers, strict=True))
-    if len(numbers) == 3:
-        return dict(zip(("rx_rad", "ry_rad", "rz_rad"), numbers, strict=True))
-    if isinstance(value, dict):
-        return dict(zip(("qx", "qy", "qz", "qw"), numbers, strict=True))
-    return dict(zip(("q0", "q1", "q2", "q3"), numbers, strict=True))
+    numbers = _numbers(value)
+    quaternion = ("qx", "qy", "qz", "qw") if isinstance(value, dict) else ("q0", "q1", "q2", "q3")
+    names = {9: MATRIX, 3: ("rx_rad", "ry_rad", "rz_rad"), 4: quaternion}[len(numbers)]
+    return dict(zip(names, numbers, strict=True))

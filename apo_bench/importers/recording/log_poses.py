@@ -1,7 +1,6 @@
 """Convert the tables of a log to times and poses, camera from model, by the conventions of the camera file."""
 
-from collections.abc import Mapping, Sequence
-from itertools import groupby
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording import log_columns
 from apo_bench.importers.recording.camera_file import Conventions
-from apo_bench.importers.recording.log_columns import UNITS, LogColumn
+from apo_bench.importers.recording.log_columns import (
+    AXIS_AND_ANGLE,
+    MATRIX,
+    NUMBERED_QUATERNION,
+    POSITION,
+    QUANTITIES,
+    QUATERNION,
+    ROTATION_VECTOR,
+    ROTATIONS,
+    UNITS,
+)
 from apo_bench.importers.recording.log_tables import LogTable
 from apo_bench.importers.recording.tracks import FARTHEST_M, FASTEST_S, NEAREST_M, SLOWEST_S, LogRows
 
@@ -21,6 +29,7 @@ _LENGTH_TOLERANCE = 0.02
 """The norm of a quaternion, an axis or a row of a matrix may differ from 1 by this."""
 _NO = ("0", "0.0", "false", "no", "n", "f", "lost", "none", "")  # cells of a column such as `valid` for a lost frame
 _EMPTY = ("", "nan", "none", "null")  # cells of a frame without a pose
+_TEXTS = ("id", "valid", "lost")  # columns that hold no numbers
 _FEWEST_GOOD = 0.5
 """Least share of the cells of a column that are numbers, and of rotations that are rotations."""
 
@@ -33,26 +42,24 @@ def read_rows(table: LogTable, how: Conventions) -> LogRows:
     Raises:
         InputError: A unit or the order of a quaternion is not stated, or most cells of a column are no numbers.
     """
-    ids, cells, lost = _read_columns(table, how)
-    cells = _one_scene(table, cells, how)
-    kept = cells.pop("kept").astype(bool)
-    ids = [name for name, keep in zip(ids, kept, strict=True) if keep]
-    lost = lost[kept]
-    places = [place for place, keep in zip(table.places, kept, strict=True) if keep]
-    given = {column.meaning: column for column in table.columns if column is not None}
-    notes = [table.form]
-    position = np.column_stack([cells[name] for name in log_columns.POSITION])
-    scale, note = _length_unit(table, given, position, how)
-    notes += note
-    R, is_rotation, note_R = _read_rotations(table, given, cells, how)
-    notes.append(note_R)
-    T = np.tile(np.eye(4), (len(ids), 1, 1))
-    t, note = _read_times(table, given, ids, cells, how)
+    table = _select_scene(table, how)
+    n = len(table.places)
+    cells = {meaning: _read_numbers(table, meaning) for meaning in table.cells if meaning not in _TEXTS}
+    ids = [str(cell).strip("/") for cell in table.cells.get("id", [table.name] * n)]
+    no = {
+        name: np.array([str(x).strip().lower() in _NO for x in table.cells[name]])
+        for name in ("valid", "lost")
+        if name in table.cells
+    }
+    position = np.column_stack([cells[name] for name in POSITION])
+    scale, note = _find_length_unit(table, position, how)
+    R, is_rotation, note_R = _read_rotations(table, cells, how)
+    t, notes = _read_times(table, ids, cells, how)
+    lost = no.get("valid", np.zeros(n, dtype=np.bool_)) | ~no.get("lost", np.ones(n, dtype=np.bool_))
     lost |= ~(np.isfinite(position).all(axis=1) & is_rotation & np.isfinite(t))
-    T[:, :3, 3] = np.where(lost[:, None], 0.0, position * scale)
-    T[~lost, :3, :3] = R[~lost]
-    score = cells.get("score", np.zeros(len(ids)))
-    return LogRows(ids, t, T, lost, score, places, [*notes, *note])
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[~lost] = pose.rigid(R[~lost], scale * position[~lost])
+    return LogRows(ids, t, T, lost, cells.get("score", np.zeros(n)), table.places, [table.form, note, note_R, *notes])
 
 
 def orient(T: Array, how: Conventions) -> tuple[Array, list[str]]:
@@ -74,41 +81,36 @@ def mirror(axis: str) -> Array:
     return np.outer(flip, flip)
 
 
-def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[str, Array], NDArray[np.bool_]]:
-    """Return the id of each row, the columns of numbers by meaning, (n,), as written, and the rows marked as lost."""
-    ids = [table.name] * len(table.rows)
-    cells: dict[str, Array] = {}
-    lost = np.zeros(len(table.rows), dtype=np.bool_)
-    for i, column in enumerate(table.columns):
-        if column is None:
-            continue
-        given = [row[i] for row in table.rows]
-        if column.meaning == "id":
-            ids = [str(cell).strip("/") for cell in given]
-        elif column.meaning in ("valid", "lost"):
-            no = np.array([str(cell).strip().lower() in _NO for cell in given])
-            lost |= no if column.meaning == "valid" else ~no
-        else:
-            require(
-                column.meaning not in cells,
-                f"{table.file}: two columns mean '{column.meaning}'; keep one, or rename the other.",
-            )
-            cells[column.meaning] = _numbers(given, table, column)
-    return ids, cells, lost
+def _select_scene(table: LogTable, how: Conventions) -> LogTable:
+    """Return the rows of one scene of BOP results; other tables unchanged."""
+    if "scene" not in table.cells:
+        return table
+    of = _read_numbers(table, "scene")
+    scenes = np.unique(of)
+    scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
+    require(
+        scene in scenes,
+        f"{table.file}: a recording is one scene, and the file holds "
+        f"{', '.join(f'{x:.0f}' for x in scenes[:6].tolist())}; state `scene` in the camera file.",
+    )
+    kept = np.flatnonzero(of == scene).tolist()
+    cells = {meaning: [own[i] for i in kept] for meaning, own in table.cells.items()}
+    return table._replace(cells=cells, places=[table.places[i] for i in kept])
 
 
-def _numbers(cells: Sequence[Any], table: LogTable, column: LogColumn) -> Array:
+def _read_numbers(table: LogTable, meaning: str) -> Array:
     """Return the cells of a column as numbers, (n,), NaN where they are none; most of them must be numbers or empty."""
-    numbers = np.array([_number(cell) for cell in cells])
+    cells = table.cells[meaning]
+    numbers = np.array([_read_number(cell) for cell in cells])
     numbers[~(np.abs(numbers) <= _LARGEST)] = np.nan
     words = [i for i, cell in enumerate(cells) if np.isnan(numbers[i]) and str(cell).strip().lower() not in _EMPTY]
     if len(words) > (1.0 - _FEWEST_GOOD) * len(cells):
         given = one_line(str(cells[words[0]]), 40)
-        raise InputError(f"{table.places[words[0]]}, column {column.meaning}: a number is needed, '{given}' was given.")
+        raise InputError(f"{table.places[words[0]]}, column {meaning}: a number is needed, '{given}' was given.")
     return numbers
 
 
-def _number(cell: Any) -> float:
+def _read_number(cell: Any) -> float:
     """Return a cell as a number; NaN if it is none."""
     try:
         return float(cell)
@@ -116,28 +118,11 @@ def _number(cell: Any) -> float:
         return np.nan
 
 
-def _one_scene(table: LogTable, cells: dict[str, Array], how: Conventions) -> dict[str, Array]:
-    """Return the columns of numbers of one scene of BOP results, with a mask of its rows as `kept`."""
-    kept = np.ones(len(table.rows), dtype=np.bool_)
-    if "scene" in cells:
-        scenes = np.unique(cells["scene"])
-        scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
-        require(
-            scene in scenes,
-            f"{table.file}: a recording is one scene, and the file holds "
-            f"{', '.join(f'{x:.0f}' for x in scenes[:6].tolist())}; state `scene` in the camera file.",
-        )
-        kept = cells["scene"] == scene
-    return {**{name: x[kept] for name, x in cells.items()}, "kept": kept.astype(np.float64)}
-
-
-def _length_unit(
-    table: LogTable, given: Mapping[str, LogColumn], position: Array, how: Conventions
-) -> tuple[float, list[str]]:
+def _find_length_unit(table: LogTable, position: Array, how: Conventions) -> tuple[float, str]:
     """Return the factor to metres: as the header or the camera file states, else as the distances suggest."""
-    unit = given["x"].unit or how.length
+    unit = table.columns["x"].unit or how.length
     if unit:
-        return UNITS["length"][unit], [f"lengths in {unit}"]
+        return UNITS["length"][unit], f"lengths in {unit}"
     distance = float(np.nanmedian(np.linalg.norm(position, axis=1))) if np.isfinite(position).any() else np.nan
     fits = [unit for unit in ("m", "mm") if NEAREST_M <= distance * UNITS["length"][unit] <= FARTHEST_M]
     require(
@@ -145,26 +130,26 @@ def _length_unit(
         f"{table.file}: the unit of the column 'x' is not known; end its name with _mm, _cm or _m, or state `length` "
         "in the camera file.",
     )
-    return UNITS["length"][fits[0]], [f"lengths taken for {fits[0]}, as no unit is stated"]
+    return UNITS["length"][fits[0]], f"lengths taken for {fits[0]}, as no unit is stated"
 
 
 def _read_times(
-    table: LogTable, given: Mapping[str, LogColumn], ids: Sequence[str], cells: Mapping[str, Array], how: Conventions
+    table: LogTable, ids: Sequence[str], cells: dict[str, Array], how: Conventions
 ) -> tuple[Array, list[str]]:
     """Return the time of each row, (n,), [s]: from its column, or from its image number and the rate of images."""
     if "sec" in cells:
         return cells["sec"] + 1e-9 * cells.get("nanosec", np.zeros(len(ids))), []
     if "t" in cells:
         t = cells["t"]
-        unit = given["t"].unit or how.time
+        unit = table.columns["t"].unit or how.time
         if unit:
             return t * UNITS["time"][unit], []
         # Rows of different objects may share a time, so steps within an object count.
-        names = np.array(ids, dtype=object)
-        steps = np.concatenate([np.diff(t[names == name]) for name in sorted({*ids})])
+        steps = np.concatenate([np.diff(t[np.array(ids) == name]) for name in sorted({*ids})])
         step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else SLOWEST_S
         fits = [unit for unit, factor in UNITS["time"].items() if FASTEST_S <= step * factor <= SLOWEST_S]
-        return t * UNITS["time"][(fits or ["s"])[0]], [f"times taken for {fits[0]}"] if fits and fits[0] != "s" else []
+        unit = (fits or ["s"])[0]
+        return t * UNITS["time"][unit], [f"times taken for {unit}"] * (unit != "s")
     rate = how.rate_hz or table.rate_hz
     if not rate:
         raise InputError(
@@ -179,69 +164,62 @@ def _count_images(ids: Sequence[str]) -> Array:
 
     If the rows are sorted by id, each id counts its own images.
     """
-    runs = [list(run) for _, run in groupby(ids)]
-    if len(runs) == len(set(ids)):
-        return np.concatenate([np.arange(len(run)) for run in runs])
-    images = []
+    names, codes = np.unique(ids, return_inverse=True)
+    images = np.zeros(len(ids))
+    if np.count_nonzero(np.diff(codes)) == len(names) - 1:
+        for code in range(len(names)):
+            images[codes == code] = np.arange(np.sum(codes == code))
+        return images
     in_image = set[str]()
-    image = 0
-    for name in ids:
-        if name in in_image:
-            image += 1
-            in_image = set()
-        in_image.add(name)
-        images.append(image)
-    return np.array(images, dtype=np.float64)
+    for i, name in enumerate(ids):
+        images[i] = images[i - 1] + (name in in_image) if i else 0.0
+        in_image = {name} if name in in_image else {*in_image, name}
+    return images
 
 
-def _read_rotations(
-    table: LogTable, given: Mapping[str, LogColumn], cells: Mapping[str, Array], how: Conventions
-) -> tuple[Array, NDArray[np.bool_], str]:
+def _read_rotations(table: LogTable, cells: dict[str, Array], how: Conventions) -> tuple[Array, NDArray[np.bool_], str]:
     """Return rotation matrices, (n, 3, 3), which rows hold one, (n,), and a note on the convention that was used."""
-    names = next(names for names in log_columns.ROTATIONS if cells.keys() >= {*names})
-    values = np.column_stack([cells[name] * _angle_unit(table, given[name], how) for name in names])
+    names = next(names for names in ROTATIONS if cells.keys() >= {*names})
+    values = np.column_stack([cells[name] * _find_angle_unit(table, name, how) for name in names])
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     values = np.where(finite[:, None], values, 0.0)
-    if names == log_columns.MATRIX:
+    if names == MATRIX:
         R = values.reshape(-1, 3, 3)
         skew = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         good = (skew <= _LENGTH_TOLERANCE) & (np.linalg.det(R) > 0.0)
         _check_share(good, finite, table, "a rotation matrix, row by row")
-        return (
-            pose.nearest_rotations(np.where(good[:, None, None], R, np.eye(3))),
-            good,
-            "rotation matrices, row by row",
-        )
-    if names in (log_columns.QUATERNION, log_columns.NUMBERED_QUATERNION):
-        order = "wxyz" if names == log_columns.QUATERNION else how.quaternion
+        R = np.where(good[:, None, None], R, np.eye(3))
+        return pose.nearest_rotations(R), good, "rotation matrices, row by row"
+    if names in (QUATERNION, NUMBERED_QUATERNION):
+        order = "wxyz" if names == QUATERNION else how.quaternion
         require(order, f'{table.file}: q0 to q3 have no stated order; state `quaternion = "wxyz"` in the camera file.')
-        good = _has_unit_length(values, finite, table, "a quaternion of length 1")
-        safe = np.where(good[:, None], values, 1.0)
-        return Rotation.from_quat(safe, scalar_first=order == "wxyz").as_matrix(), good, f"quaternions as {order}"
-    if names == log_columns.ROTATION_VECTOR:
+        good = _have_unit_length(values, finite, table, "a quaternion of length 1")
+        values = np.where(good[:, None], values, 1.0)
+        return Rotation.from_quat(values, scalar_first=order == "wxyz").as_matrix(), good, f"quaternions as {order}"
+    if names == ROTATION_VECTOR:
         return Rotation.from_rotvec(values).as_matrix(), finite, "rotation vectors"
-    if names == log_columns.AXIS_AND_ANGLE:
-        good = _has_unit_length(values[:, :3], finite, table, "an axis of length 1")
+    if names == AXIS_AND_ANGLE:
+        good = _have_unit_length(values[:, :3], finite, table, "an axis of length 1")
         return Rotation.from_rotvec(values[:, :3] * values[:, 3:]).as_matrix(), good, "axis and angle"
     if how.euler is None:
         raise InputError(f'{table.file}: Euler angles have no stated order; state `euler = "xyz"` in the camera file.')
     return Rotation.from_euler(how.euler, values).as_matrix(), finite, f"Euler angles as {how.euler}"
 
 
-def _angle_unit(table: LogTable, column: LogColumn, how: Conventions) -> float:
+def _find_angle_unit(table: LogTable, meaning: str, how: Conventions) -> float:
     """Return the factor from the unit of a column to radians; 1 for a column that is no angle."""
-    if log_columns.QUANTITIES.get(column.meaning) != "angle":
+    if QUANTITIES.get(meaning) != "angle":
         return 1.0
-    unit = column.unit or how.angle
+    unit = table.columns[meaning].unit or how.angle
     if not unit:
         raise InputError(
-            f"{table.file}: the unit of the column '{column.meaning}' is not known; end its name with _deg or _rad, or "
+            f"{table.file}: the unit of the column '{meaning}' is not known; end its name with _deg or _rad, or "
             "state `angle` in the camera file."
         )
     return UNITS["angle"][unit]
 
 
-def _has_unit_length(vectors: Array, finite: NDArray[np.bool_], table: LogTable, needed: str) -> NDArray[np.bool_]:
+def _have_unit_length(vectors: Array, finite: NDArray[np.bool_], table: LogTable, needed: str) -> NDArray[np.bool_]:
     """Return which vectors, (n, k), have length 1; most of those that are not zero must."""
     length = np.linalg.norm(vectors, axis=1)
     good = np.abs(length - 1.0) <= _LENGTH_TOLERANCE

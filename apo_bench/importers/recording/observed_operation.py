@@ -1,11 +1,11 @@
 """Extract one operation from a log: where its part was put, along which path, and which other parts moved with it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import Array, find_nearest_equivalent_pose, pose
-from apo_bench.importers.recording.ordering import end_of_operation, time_taken
+from apo_bench.importers.recording.ordering import Chosen, end_of_operation, list_settled, time_taken
 from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 from apo_bench.importers.recording.rests import Rest
 from apo_bench.importers.recording.tracks import PoseTrack
@@ -23,13 +23,13 @@ class LoggedOperation(NamedTuple):
     carried: Mapping[str, Array] = {}
     """Carried part -> body twist by which it slipped relative to the main part, (6,), [m, rad]."""
     adjusted: Mapping[str, Array] = {}
-    """Part that the operation should not move -> body twist by which it moved nevertheless, (6,), [m, rad]."""
+    """Part that no operation moves from now on -> body twist by which it moved nevertheless, (6,), [m, rad]."""
 
 
 def observed_operation(
     tracks: Mapping[str, PoseTrack],
     intervals: RestIntervals,
-    chosen: Sequence[RestInterval | None],
+    chosen: Chosen,
     assembly: Assembly,
     T_world_camera: Array,
     k: int,
@@ -45,24 +45,19 @@ def observed_operation(
     interval = chosen[k]
     if interval is None:
         return LoggedOperation()
-    over = end_of_operation(assembly, intervals, chosen, k)
-    rest = interval.at(over)
-    begins = time_taken(assembly, intervals, chosen[:k], interval)
+    begins = time_taken(intervals, chosen[:k], interval)
+    ends = end_of_operation(intervals, chosen, k)
+    rest = interval.at(ends)
     track = tracks[operation.main]
     among = (track.t >= begins) & (track.t <= rest.begins)
     seen = track.T[among]
     if len(seen):  # the image of the rest
-        seen = (
-            seen
-            @ pose.inverse(seen[-1])
-            @ find_nearest_equivalent_pose(assembly.solids[operation.main], seen[-1], rest.T)
-        )
-    path = PoseTrack(track.t[among], T_world_camera @ seen)
-    # Poses before this operation include what earlier operations put, even if their part came to rest after this start.
-    before = find_rest_poses(
-        intervals, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
-    )
-    after = find_rest_poses(intervals, over)
+        image = find_nearest_equivalent_pose(assembly.solids[operation.main], seen[-1], rest.T)
+        seen = seen @ pose.inverse(seen[-1]) @ image
+    # Poses before this operation include what earlier operations put, even if their part came to rest after its begin.
+    settled = max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
+    before = find_rest_poses(intervals, settled, chosen[:k], chosen[k:], list_settled(assembly, k - 1))
+    after = find_rest_poses(intervals, ends, chosen[: k + 1], chosen[k + 1 :], list_settled(assembly, k))
     # The displacement of the main part, in the frame of the camera, also moves whatever is fixed to it in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])
     carried = {
@@ -70,9 +65,10 @@ def observed_operation(
         for part in operation.carries
         if part in before
     }
-    # What moves a part before its own operations have ended is no error of where they left it.
     placed = assembly.fixed | {part for earlier in assembly.operations[:k] for part in earlier.moves}
-    placed = placed & before.keys() - {operation.main, *carried}
-    twists = {part: pose.log(pose.inverse(before[part]) @ after[part]) for part in sorted(placed)}
+    moved = {part for other in assembly.operations[k:] for part in other.moves}
+    twists = {
+        part: pose.log(pose.inverse(before[part]) @ after[part]) for part in sorted(placed & before.keys() - moved)
+    }
     adjusted = {part: twist for part, twist in twists.items() if twist.any()}
-    return LoggedOperation(interval, rest, path, carried, adjusted)
+    return LoggedOperation(interval, rest, PoseTrack(track.t[among], T_world_camera @ seen), carried, adjusted)

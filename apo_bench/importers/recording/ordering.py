@@ -1,10 +1,10 @@
 """Find the rest interval that ends each operation of a scenario.
 
-The last operation of a part should end with its last interval; earlier intervals may be pauses of a hand in the air. Of
-all choices in the order of the operations, the best has long intervals and nearly closed contacts.
+Operations end one after another. A part that comes to rest is explained by the operation in progress if that one moves
+it. The best choice of intervals explains most, and has long intervals and nearly closed contacts.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -20,11 +20,11 @@ from apo_bench.importers.recording.rest_intervals import RestInterval, RestInter
 _LONG_S = 1.0  # seconds beyond which a longer interval is not worth more
 _WIDE_MM = 50.0  # misfit beyond which a contact is not worse
 """The worth of an interval is its seconds, up to 1, less 1 for each 10 mm of misfit, up to 5."""
-_LEFT_OVER = 5.0
+_UNEXPLAINED = 5.0
 """Penalty for each interval that no operation explains."""
-_LOST_S = 0.5  # a part that is seen at rest no more this long before the end of the log was lost, or not put down
 _SKIPPED = 8.0
 """Penalty for an operation that nobody saw, as its part was hidden."""
+_LOST_S = 0.5  # a part that is seen at rest no more this long before the end of the log was lost, or not put down
 _OVERLAP_S = 0.5
 """An operation may take its part this much earlier than the part of the previous operation comes to rest."""
 _CLOSE = 0.3
@@ -60,15 +60,21 @@ class _Choice(NamedTuple):
     """A choice of intervals for the first operations, with its worth."""
 
     worth: float
-    begins: float
-    """Begin of the last interval, [s]; the earliest time, if its part was hidden before."""
+    unexplained: int
     intervals: Chosen
+
+    @property
+    def value(self) -> float:
+        return self.worth - _UNEXPLAINED * self.unexplained
 
 
 def find_order(
     assembly: Assembly, intervals: RestIntervals, start: Poses, T_world_camera: Array, unseen: Sequence[int]
 ) -> Order:
     """Return the best choice of intervals, with its rival.
+
+    Dynamic programming over operations: what follows depends on a choice nearly only by its last interval, so the two
+    best choices that end with the same interval are kept.
 
     Args:
         intervals: Rest intervals of every tracked part, in the frame of the camera.
@@ -78,24 +84,32 @@ def find_order(
     Raises:
         NoMatchingOrder: No choice has the order of the operations.
     """
-    # Part -> its last observed operation.
-    last = {operation.main: k for k, operation in enumerate(assembly.operations) if k not in unseen}
 
     @cache
     def worth(k: int, interval: RestInterval) -> float:
         """Return the worth of an interval as the end of operation k."""
-        known = intervals[interval.part]
-        poses = {**start, **{part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}}
+        seen = find_rest_poses(intervals, interval.ends, settled=list_settled(assembly, k))
+        poses = {**start, **{part: T_world_camera @ T for part, T in seen.items()}}
         images = list_images(assembly.solids[interval.part], poses[interval.part])
         wrong_mm = min(contact_fit(assembly, k, {**poses, interval.part: T}).wrong_mm for T in images)
-        is_carried_later = any(interval.part in other.carries for other in assembly.operations[k + 1 :])
-        is_last = last[interval.part] == k and not is_carried_later
-        left = len(known) - 1 - known.index(interval) if is_last else 0  # later intervals that no operation explains
-        return min(interval.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0 - _LEFT_OVER * left
+        return min(interval.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0
 
-    best = _best_choices(assembly, intervals, worth, unseen)
-    is_close = len(best) > 1 and best[0].worth - best[1].worth < _CLOSE
-    return Order(best[0].intervals, best[1].intervals if is_close else None)
+    choices = [_Choice(0.0, 0, ())]
+    while len(choices[0].intervals) < len(assembly):
+        longer = [each for choice in choices for each in _lengthen(choice, assembly, intervals, worth, unseen)]
+        if not longer:
+            break
+        choices = _keep_best(longer)
+    reached = len(choices[0].intervals)
+    choices = [_count_rest(choice, assembly, intervals) for choice in choices]
+    if reached < len(assembly):  # the log may end before the last operations, if it shows no others
+        choices = [each for each in choices if any(each.intervals) and not each.unexplained]
+    if not choices:
+        raise _explain_order(assembly, intervals, reached)
+    best = sorted(choices, key=lambda choice: -choice.value)
+    missing = (None,) * (len(assembly) - reached)
+    is_close = len(best) > 1 and best[0].value - best[1].value < _CLOSE
+    return Order((*best[0].intervals, *missing), (*best[1].intervals, *missing) if is_close else None)
 
 
 def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[float]) -> Order:
@@ -127,124 +141,100 @@ def describe_moves(intervals: RestIntervals) -> str:
     return ", ".join(f"{part} {t:.1f} s" for t, part in arrivals[:12]) or "none"
 
 
-def _best_choices(
-    assembly: Assembly, intervals: RestIntervals, worth: Callable[[int, RestInterval], float], unseen: Sequence[int]
-) -> list[_Choice]:
-    """Return at most two choices whose intervals are in the order of the operations, the best first.
-
-    Dynamic programming over operations: what follows depends on a choice only by its last interval, except for carried
-    parts. So the two best choices that end with the same interval are kept.
-
-    Args:
-        worth: Function of an operation, counted from 0, and the interval that ends it.
-        unseen: Operations that were not observed, counted from 0.
-    """
-    choices = [_Choice(0.0, -np.inf, ())]
-    for k, operation in enumerate(assembly.operations):
-        if k in unseen:
-            choices = [choice._replace(intervals=(*choice.intervals, None)) for choice in choices]
-            continue
-        by_end: dict[RestInterval, list[_Choice]] = {}
-        for choice in choices:
-            for interval in intervals[operation.main][1:]:  # the first interval is the start
-                moved_on = _moves_between(assembly, intervals, choice.intervals, interval)
-                if interval.begins > choice.begins and moved_on is not None:
-                    # Intervals that contradict the order.
-                    amiss = moved_on + _strangers(intervals, operation.moves, choice.begins, interval)
-                    value = choice.worth + worth(k, interval) - _LEFT_OVER * amiss
-                    longer = _Choice(value, max(choice.begins, interval.came), (*choice.intervals, interval))
-                    by_end.setdefault(interval, []).append(longer)
-        own = intervals[operation.main]
-        is_lost = own[-1].ends < max(known[-1].ends for known in intervals.values()) - _LOST_S
-        if is_lost or any(each.gone > each.ends or each.came < each.begins for each in own):
-            # The part may have come to rest and gone again while it was hidden.
-            skipped = [_Choice(c.worth - _SKIPPED, c.begins, (*c.intervals, None)) for c in choices]
-            choices = [*(each for ending in by_end.values() for each in _best_two(ending)), *_best_two(skipped)]
-            continue
-        if not by_end:
-            rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
-            raise NoMatchingOrder(
-                f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
-                f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on; none of these "
-                "follows the others; check the ids in the objects file and that the log begins before the first part "
-                "is taken, or state --operation-ends, or --unobserved for operations that the log does not show."
-            )
-        choices = [each for ending in by_end.values() for each in _best_two(ending)]
-    return _best_two(choices)
-
-
-def _best_two(choices: list[_Choice]) -> list[_Choice]:
-    """Return the two choices of greatest worth, the best first."""
-    return sorted(choices, key=lambda choice: -choice.worth)[:2]
-
-
-def _strangers(intervals: RestIntervals, moved: Collection[str], t: float, until: RestInterval) -> int:
-    """Return how many parts that an operation does not move came to rest elsewhere during it.
-
-    Args:
-        moved: Parts that the operation moves.
-        t: Begin of the last interval of the operation before, [s].
-        until: The interval that ends the operation.
-    """
-    return sum(
-        any(t + _OVERLAP_S < other.came and other.begins < until.begins + _OVERLAP_S for other in known[1:])
-        for part, known in intervals.items()
-        if part not in moved
-    )
-
-
-def time_taken(
-    assembly: Assembly, intervals: RestIntervals, before: Sequence[RestInterval | None], interval: RestInterval
-) -> float:
-    """Return the time at which the part of an operation was taken, [s].
-
-    It is the end of the interval in which an earlier operation left the part, or of its start.
+def time_taken(intervals: RestIntervals, before: Chosen, interval: RestInterval) -> float:
+    """Return the time until which a part rested where earlier operations had left it, [s].
 
     Args:
         before: The intervals that end the operations before this one.
         interval: The interval that ends this operation.
     """
-    part = interval.part
-    own = [(k, each) for k, each in enumerate(before) if each is not None and each.part == part]
-    since = own[-1][0] + 1 if own else 0  # the first operation after that which put the part
-    # A carrier moved the part since, so the interval just before counts.
-    is_carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
-    if own and not is_carried:
-        return own[-1][1].gone
-    earlier = [other for other in intervals[part] if other.begins < interval.begins]
-    return earlier[-1 if is_carried else 0].gone if earlier else 0.0
+    known = intervals[interval.part]
+    own = known[: known.index(interval)]
+    there = [each for each in own if each.came <= _ended(before) + _OVERLAP_S]
+    return (there or own)[-1 if there else 0].gone if own else 0.0
 
 
-def end_of_operation(
-    assembly: Assembly, intervals: RestIntervals, chosen: Sequence[RestInterval | None], k: int
-) -> float:
-    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest.
-
-    Args:
-        chosen: The interval that ends each operation.
-    """
+def end_of_operation(intervals: RestIntervals, chosen: Chosen, k: int) -> float:
+    """Return the time when observed operation k had ended, [s]: when the next one began, else the end of its rest."""
     interval = chosen[k]
     assert interval is not None
-    for j, later in enumerate(chosen):
-        if j > k and later is not None:
-            t = time_taken(assembly, intervals, chosen[:j], later)
-            return float(np.clip(t, interval.begins, interval.ends))
-    return interval.ends
+    later = (time_taken(intervals, chosen[:j], each) for j, each in enumerate(chosen) if j > k and each is not None)
+    return float(np.clip(next(later, interval.ends), interval.came, interval.ends))
 
 
-def _moves_between(assembly: Assembly, intervals: RestIntervals, before: Chosen, interval: RestInterval) -> int | None:
-    """Return how often the part of the operation before still moved until the next part was taken.
+def list_settled(assembly: Assembly, k: int) -> set[str]:
+    """Return the parts that no operation after operation k moves."""
+    return {*assembly.solids} - {part for operation in assembly.operations[k + 1 :] for part in operation.moves}
 
-    None if the next part was taken before the part of the operation before came to rest, which excludes this choice.
 
-    Args:
-        before: The intervals that end the operations before.
-        interval: The interval that ends the next operation.
+def _lengthen(
+    choice: _Choice,
+    assembly: Assembly,
+    intervals: RestIntervals,
+    worth: Callable[[int, RestInterval], float],
+    unseen: Sequence[int],
+) -> Iterator[_Choice]:
+    """Yield the choice with each interval that may end the next operation, or None if that may have been hidden."""
+    k = len(choice.intervals)
+    known = intervals[assembly.operations[k].main]
+    # The first interval is the start, unless the part was hidden before.
+    first = 1 + max(
+        (known.index(each) for each in choice.intervals if each in known), default=-known[0].rests[0].hidden
+    )
+    for interval in known[first:] if k not in unseen else ():
+        ended = _ended(choice.intervals)
+        if interval.begins > ended and time_taken(intervals, choice.intervals, interval) + _OVERLAP_S >= ended:
+            chosen = (*choice.intervals, interval)
+            unexplained = _count_unexplained(choice.intervals, _ended(chosen), assembly, intervals)
+            yield _Choice(choice.worth + worth(k, interval), choice.unexplained + unexplained, chosen)
+    is_lost = known[-1].ends < max(each[-1].ends for each in intervals.values()) - _LOST_S
+    if k in unseen or is_lost or any(each.rests[0].hidden for each in known):
+        yield _Choice(choice.worth - _SKIPPED * (k not in unseen), choice.unexplained, (*choice.intervals, None))
+
+
+def _keep_best(choices: Sequence[_Choice]) -> list[_Choice]:
+    """Return the two best choices with each last interval, the best first."""
+    kept: list[_Choice] = []
+    for choice in sorted(choices, key=lambda choice: -choice.value):
+        if sum(other.intervals[-1] is choice.intervals[-1] for other in kept) < 2:
+            kept.append(choice)
+    return kept
+
+
+def _count_rest(choice: _Choice, assembly: Assembly, intervals: RestIntervals) -> _Choice:
+    """Return a choice that counts what came to rest after the last operation."""
+    more = _count_unexplained(choice.intervals, np.inf, assembly, intervals)
+    return choice._replace(unexplained=choice.unexplained + more)
+
+
+def _count_unexplained(chosen: Chosen, until: float, assembly: Assembly, intervals: RestIntervals) -> int:
+    """Return how many parts came to rest between the last observed operation and a time, [s], without a reason.
+
+    Operations that were not observed since, and the one that ends at this time, explain the parts that they move.
     """
-    last = before[-1] if before else None
-    if last is None:
-        return 0
-    t = time_taken(assembly, intervals, before, interval)
-    if last.came > t + _OVERLAP_S:
-        return None
-    return sum(last.begins < other.begins < t - _OVERLAP_S for other in intervals[last.part])
+    since = max((k + 1 for k, each in enumerate(chosen) if each is not None), default=0)
+    ends_now = len(chosen) + (until < np.inf)
+    moved = {part for operation in assembly.operations[since:ends_now] for part in operation.moves}
+    return sum(
+        _ended(chosen) + _OVERLAP_S < each.came and each.begins < until + _OVERLAP_S
+        for part, known in intervals.items()
+        if part not in moved
+        for each in known[1:]
+    )
+
+
+def _ended(chosen: Chosen) -> float:
+    """Return the earliest time at which the last observed operation may have ended, [s]."""
+    return max((each.came for each in chosen if each is not None), default=-np.inf)
+
+
+def _explain_order(assembly: Assembly, intervals: RestIntervals, k: int) -> NoMatchingOrder:
+    """Return an error that names the operation for which no interval is left."""
+    part = assembly.operations[k].main
+    rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[part])
+    return NoMatchingOrder(
+        f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
+        f"scenario: '{part}', which operation {k + 1} moves, rests from {rests} on; none of these "
+        "follows the others; check the ids in the objects file and that the log begins before the first part "
+        "is taken, or state --operation-ends, or --unobserved for operations that the log does not show."
+    )

@@ -1,11 +1,12 @@
 """Group rests between which a part is only adjusted into one interval at one place."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
+from apo_bench.assembly import Poses
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.importers.recording.folding import forget_turn
 from apo_bench.importers.recording.rests import Rest, find_rests, group_consecutive
@@ -88,16 +89,28 @@ def find_intervals(part: str, rests: Sequence[Rest]) -> tuple[RestInterval, ...]
     return tuple(RestInterval(part, tuple(group)) for group in groups)
 
 
-def find_rest_poses(intervals: RestIntervals, t: float) -> Mapping[str, Array]:
+def find_rest_poses(
+    intervals: RestIntervals,
+    t: float,
+    ended: Collection[RestInterval | None] = (),
+    later: Collection[RestInterval | None] = (),
+    settled: Collection[str] = (),
+) -> Poses:
     """Return the pose at which every part rests at a time, [s], or rested last: (4, 4), camera from part, [m].
 
     Before its first rest a part has the pose of that rest.
+
+    Args:
+        ended: Intervals in which earlier operations left their parts, even if these were hidden until later.
+        later: Intervals in which later operations left their parts.
+        settled: Parts that no later operation moves: where they rest after they were hidden, they were all the time.
     """
-    return {
-        part: next((each for each in reversed(known) if each.begins <= t), known[0]).at(t).T
-        for part, known in intervals.items()
-        if known
-    }
+    poses = {}
+    for part, known in intervals.items():
+        arrived = [each for each in known if (each.came if part in settled else each.begins) <= t or each in ended]
+        there = [each for each in arrived if each not in later]
+        poses[part] = (there[-1] if there else known[0]).at(t).T
+    return poses
 
 
 def is_near(twist: Array) -> bool:

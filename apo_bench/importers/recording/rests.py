@@ -54,6 +54,8 @@ class Rest:
     mean: Mean
     came: float = -np.inf
     """The time from which on the part may have been there, [s]: earlier than `begins` if it was hidden before."""
+    hidden: bool = False
+    """Whether the part was hidden at some time since its rest before."""
 
     @property
     def T(self) -> Array:
@@ -75,24 +77,31 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
         a, b = _trim(T, *span, noise)
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    # Merge neighbouring spans at one pose, unless the part left and returned in between.
-    groups = group_consecutive(
-        spans, lambda group, span: _is_one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window)
-    )
-    ends = [(group[0][0], group[-1][1]) for group in groups]
-    spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
+    spans = [(stride * a, stride * b) for a, b in spans if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
     hidden_s = max(LEAST_REST_S, (2 * _FEWEST - 1) * period_s)
-    last_seen = np.flatnonzero(np.diff(track.t) > hidden_s)  # gaps in which the part was not tracked
-    rests = []
+    # Gaps in which the part was not tracked, from frame to frame; the log begins at 0 s.
+    left = np.flatnonzero(np.diff(track.t, prepend=0.0) > hidden_s) - 1
+    rests: list[Rest] = []
     for (a, b), mean in zip(spans, means, strict=True):
-        # The last frames of a rest may be trimmed by chance, so a gap may begin a few frames after its end.
-        seen_again = [float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride]
-        seen_before = [float(track.t[i]) for i in last_seen if a - 2 * stride <= i + 1 <= a]
+        # The outer frames of a rest may be trimmed by chance, so a gap may lie a few frames apart from it.
+        gone = [float(track.t[i + 1]) for i in left if b <= i <= b + 2 * stride]
+        came = [float(track.t[i]) if i >= 0 else -np.inf for i in left if a - 2 * stride <= i + 1 <= a]
         begins, ends_s = float(track.t[a]), float(track.t[b])
-        gone = max(seen_again, default=ends_s)
-        rests.append(Rest(a, b, begins, ends_s, gone, pool_mean(mean, common), min(seen_before, default=begins)))
+        hidden = bool(np.any((left < a) & (left >= (rests[-1].last if rests else -1))))
+        rests.append(
+            Rest(
+                a,
+                b,
+                begins,
+                ends_s,
+                max(gone, default=ends_s),
+                pool_mean(mean, common),
+                min(came, default=begins),
+                hidden,
+            )
+        )
     return tuple(rests)
 
 
@@ -210,21 +219,3 @@ def group_consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item]
         else:
             groups.append([item])
     return groups
-
-
-def _is_one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
-    """Whether two stretches are one rest: their means agree, and the part did not leave in between.
-
-    Args:
-        before, after: First and last frame of each stretch.
-        noise: (6,), standard deviation of one frame per axis.
-        m: Frames in half a window; a shorter gap is not tested.
-    """
-    mean, mean_after = (average(T[a : b + 1]) for a, b in (before, after))
-    off = pose.log(pose.inverse(mean.T) @ mean_after.T)
-    deviation = noise * np.sqrt(1.0 / mean.independent + 1.0 / mean_after.independent)
-    chi = float(((off / deviation) ** 2).sum())
-    if chi > _SHIFTED and (np.abs(off[:3]).max() > _SAME_M or np.abs(off[3:]).max() > _SAME_RAD):
-        return False
-    between = pose.log(pose.inverse(mean.T) @ T[before[1] + 1 : after[0]]) / noise
-    return len(between) <= m or bool((np.abs(np.median(between, axis=0)) < 3.0).all())

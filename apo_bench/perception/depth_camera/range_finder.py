@@ -43,16 +43,34 @@ class PinholeView:
         """The common origin of all rays, (3,), world, [m]."""
         return self.T_world_view[:3, 3]
 
+    @property
+    def focal(self) -> float:
+        """Focal length, [pixels]."""
+        return float(self.height / 2 / np.tan(np.radians(self.fov_deg) / 2))
+
+    @property
+    def K(self) -> Array:
+        """The camera matrix, (3, 3), [pixels]; the middle of the first pixel is at (0, 0)."""
+        middle = (self.width - 1) / 2, (self.height - 1) / 2
+        return np.array([[self.focal, 0.0, middle[0]], [0.0, self.focal, middle[1]], [0.0, 0.0, 1.0]])
+
     @cached_property
     def rays(self) -> Array:
         """Unit vectors through the middles of the pixels, row by row, (height * width, 3), world."""
-        # The ray of pixel (u, v) is (u - middle, v - middle, focal), with the focal length in pixels.
-        focal = self.height / 2 / np.tan(np.radians(self.fov_deg) / 2)
         v, u = np.mgrid[: self.height, : self.width]
-        x = (u + 0.5 - self.width / 2) / focal
-        y = (v + 0.5 - self.height / 2) / focal
+        return copy_frozen(self.cast_through(u, v))
+
+    def cast_through(self, u: Array, v: Array) -> Array:
+        """Unit vectors through the middles of pixels, (n, 3), world.
+
+        Args:
+            u, v: Columns and rows, of any equal shape; they may be outside the image.
+        """
+        # The ray of pixel (u, v) is (u - middle, v - middle, focal), with the focal length in pixels.
+        x = (u + 0.5 - self.width / 2) / self.focal
+        y = (v + 0.5 - self.height / 2) / self.focal
         rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
-        return copy_frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 class RangeImage(NamedTuple):

@@ -14,7 +14,7 @@ from apo_bench.names import resolve
 from apo_bench.perception.observation.function_noise import make_function_noise
 from apo_bench.perception.observation.models import NoiseLevel
 from apo_bench.perception.observation.models.camera_failures import make_failures
-from apo_bench.perception.observation.noise_file import find_noise_path, list_presets
+from apo_bench.perception.observation.noise_file import list_noise_files, list_presets
 from apo_bench.records import FAILURES
 
 __all__ = ["FAILURES", "NOISES", "Noise", "NoiseLevel", "make_noise"]
@@ -44,9 +44,10 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
 
     Args:
         given: A name of `NOISES`; one of `FAILURES` with its rates (`flips:p=0.1/r=0.5`); `"package.module:name"`; a
-            noise file (`.toml`, the name of one in the package, or `"empirical:"` and a file of residuals); or an
-            object. A class is instantiated with the noise level. A function `(assembly, shown, rng) -> Observation` is
-            used unchanged, and a function `(poses, rng) -> poses` needs attributes `deviation_mm`, `deviation_deg`.
+            noise file (`.toml`, the name of one in the package, or `"empirical:"` and a file of residuals); `"poses:"`
+            and a results file of the BOP format; or an object. A class is instantiated with the noise level. A function
+            `(assembly, shown, rng) -> Observation` is used unchanged, and a function `(poses, rng) -> poses` needs
+            attributes `deviation_mm`, `deviation_deg`.
         noise_level: Standard deviation per axis, [mm, degrees].
 
     Raises:
@@ -59,7 +60,7 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
             f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.",
         )
     if isinstance(given, str):
-        if find_noise_path(given) is not None:
+        if list_noise_files(given):
             from apo_bench.perception.observation.noise_file import make_noise_of_file
 
             if (measured := make_noise_of_file(given, noise_level)) is not None:
@@ -109,7 +110,7 @@ def _instantiate(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
 
 def _unknown_name_error(given: str, names: Iterable[str]) -> str:
     """The error message for an unknown name."""
-    sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
+    sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "poses:FILE.csv", "FILE.toml"))
     return sentence + " Or give your own as 'package.module:name'."
 
 

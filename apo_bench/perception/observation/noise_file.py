@@ -18,14 +18,18 @@ from apo_bench.perception.observation.models import (
     FittedNoise,
     MeasuredNoise,
     NoiseLevel,
+    PoseResults,
     StudentT,
     TruncatedTails,
     load_empirical_noise,
+    read_pose_results,
 )
-from apo_bench.records import RESIDUALS
+from apo_bench.records import ESTIMATES, RESIDUALS
 from apo_bench.resources import folder
 from apo_bench.scenario.values import Pose
 
+SEPARATOR = "::"
+"""Between a results file and the noise file that states its errors."""
 _FARTHEST_MM = 1e5
 """Largest allowed distance of an outlier."""
 _INFINITE_FREEDOM = 1e300
@@ -70,32 +74,36 @@ def list_presets() -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
 
 
-def find_noise_path(name: str) -> Path | None:
-    """Return the file that the name of a noise model refers to; None if the name refers to no file.
+def list_noise_files(name: str) -> tuple[Path, ...]:
+    """Return the files that the name of a noise model refers to, the main one first; empty if it refers to none.
 
     Args:
-        name: A path that ends in .toml, the name of a noise file of the package, or `empirical:` and the path of a file
-            of residuals.
+        name: A path that ends in .toml, the name of a noise file of the package, `empirical:` and the path of a file of
+            residuals, or `poses:` and the path of a results file, which `::` and a noise file may follow.
     """
     if name.startswith(RESIDUALS):
-        return Path(name.removeprefix(RESIDUALS))
-    if name.endswith(".toml"):
-        return Path(name)
-    return list_presets().get(name)
+        return (Path(name.removeprefix(RESIDUALS)),)
+    if name.startswith(ESTIMATES):
+        results, _, fitted = name.removeprefix(ESTIMATES).partition(SEPARATOR)
+        return Path(results), *(list_noise_files(fitted) or (Path(fitted),) * bool(fitted))
+    preset = list_presets().get(name)
+    return (Path(name),) if name.endswith(".toml") else () if preset is None else (preset,)
 
 
-def make_noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | None:
-    """Make the noise model of a name as in `find_noise_path`; None if the name refers to no file.
+def make_noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | PoseResults | None:
+    """Make the noise model of a name as in `list_noise_files`; None if the name refers to no file.
 
     Raises:
         InputError: The file is not valid; the message names file and place.
     """
-    path = find_noise_path(name)
-    if path is None:
+    paths = list_noise_files(name)
+    if not paths:
         return None
     if name.startswith(RESIDUALS):
-        return load_empirical_noise(path, noise_level)
-    measured, camera = read_noise(path)
+        return load_empirical_noise(paths[0], noise_level)
+    if name.startswith(ESTIMATES):
+        return read_pose_results(paths[0], noise_level, *(read_noise(path)[0] for path in paths[1:]))
+    measured, camera = read_noise(paths[0])
     return FittedNoise(measured, noise_level, camera)
 
 

@@ -26,7 +26,7 @@ Index = NDArray[np.integer[Any]]
 """(n,): indices of trials, or numbers of values or groups."""
 _NOT_KEPT = (
     *("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried_corrections", "fit_adjustments"),
-    *("grasp_slip", "reached", "failure_prediction"),  # the last has its own columns
+    *("grasp_slip", "final_poses", "failure_prediction"),  # the last has its own columns
 )
 # column -> default of its setting
 _USUAL = {info.name: info.default for name, info in SETTINGS.items() if name != "scenario"}

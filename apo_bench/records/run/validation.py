@@ -63,7 +63,7 @@ CHECKED = (
     *("failure_stage", "failure_code", "sim_time_s", "extra_steps"),
 )
 """Columns that may contradict each other."""
-_LARGE = ("thresholds", "conditions", "tried_corrections", "fit_adjustments", "grasp_slip", "reached")
+_LARGE = ("thresholds", "conditions", "tried_corrections", "fit_adjustments", "grasp_slip", "final_poses")
 """Columns that tables do not need; without them a record is read in half the time."""
 
 

@@ -2,9 +2,11 @@
 
 from apo_bench.simulation.scene.clamps import list_clamps, release_clamp, weld_clamp
 from apo_bench.simulation.scene.composing import HANDS
+from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels
 from apo_bench.simulation.scene.render import (
     aim_camera,
+    build_data,
     build_data_with_arm,
     check_film,
     copy_data,
@@ -13,6 +15,7 @@ from apo_bench.simulation.scene.render import (
     place_for_picture,
     save_film,
 )
+from apo_bench.simulation.scene.scaled_physics import PhysicsScale, ScaledPhysics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import (
     WRIST_SENSORS,
@@ -31,17 +34,23 @@ from apo_bench.simulation.scene.world import (
     use_timestep,
     wake,
 )
+from apo_bench.simulation.scene.wrist_camera import WRIST_CAMERA
 
 __all__ = (
     "HANDS",
+    "WRIST_CAMERA",
     "WRIST_SENSORS",
+    "KeptRenderer",
     "Marks",
+    "PhysicsScale",
+    "ScaledPhysics",
     "Scene",
     "ShiftArrows",
     "TurnRing",
     "World",
     "aim_camera",
     "allow_sleep",
+    "build_data",
     "build_data_with_arm",
     "build_scene",
     "check_film",

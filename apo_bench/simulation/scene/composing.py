@@ -16,6 +16,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, place_layout
 from apo_bench.scenario.parts import PartFile, read_part
 from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.physics import Physics, set_contact, set_options
 from apo_bench.simulation.scene.clamps import list_clamps
@@ -23,6 +24,7 @@ from apo_bench.simulation.scene.contact_bits import OF_PARTS, Bits, meetings
 from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import CLAMP, WRIST_SENSORS
+from apo_bench.simulation.scene.wrist_camera import add_wrist_camera
 
 HANDS = ("hand0", "hand1")
 _HAND_SOLREF = (0.01, 1.0)
@@ -67,14 +69,14 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
     return spec
 
 
-def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
-    """The world of the replay: the room with parts, the arm, force sensors, and welds for the ideal gripper.
+def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, kinematics: Kinematics) -> Any:
+    """The world of the replay: the room with parts, the arm, its camera and sensors, and welds for the ideal gripper.
 
     The wrist sensors come last; they stay off until a replay needs them (`switch_wrist_sensors_on`).
 
     Args:
         grasp: `friction` or `weld`.
-        first_link: The first body of the arm that moves.
+        kinematics: Those of the arm.
     """
     spec = room.copy()
     if grasp == "weld":
@@ -82,8 +84,9 @@ def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: 
             _add_weld(spec, f"grasp_{part}", f"arm/{arm.mount}", body, _ARM_SOLREF, _ARM_SOLIMP)
     _add_clamps(spec, scenario)
     _add_arm(spec, arm, settings)
-    _add_force_sensors(spec, scenario, f"arm/{first_link}")
+    _add_force_sensors(spec, scenario, f"arm/{kinematics.first_link}")
     _add_wrist_sensors(spec, f"arm/{arm.mount}")
+    add_wrist_camera(spec, kinematics)
     return spec
 
 

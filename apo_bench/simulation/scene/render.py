@@ -1,6 +1,5 @@
 """Render pictures and films of a scene, and show a replay in a window."""
 
-import weakref
 from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +14,8 @@ from apo_bench.assembly import Poses
 from apo_bench.errors import InputError, missing_package, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.io import write_file
-from apo_bench.simulation.graphics import need_window, renderer
+from apo_bench.simulation.graphics import SHADOW_TEXELS, need_window, renderer
+from apo_bench.simulation.scene.kept_renderer import KeptRenderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
 
@@ -44,7 +44,7 @@ def draw_picture(
         camera: `overview`, `close`, `top`, or the result of `aim_camera`.
         more: A function that adds geoms to MuJoCo's abstract scene.
     """
-    return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
+    return _draw(scene.shown, build_data(scene.shown, scene, poses), width, height, camera, more)
 
 
 def picture_with_arm(
@@ -67,7 +67,7 @@ def picture_with_arm(
 
 def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
     """The `mujoco.MjData` of the replay world that `picture_with_arm` shows."""
-    data = _at(scene.work, scene, poses)
+    data = build_data(scene.work, scene, poses)
     move_arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
@@ -154,9 +154,7 @@ class Film:
         self.camera = camera or aim_camera(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         _check_camera(scene.work, self.camera)
-        self._renderer = renderer(scene.work.model, width, height)
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        self._close = weakref.finalize(self, _release, self._renderer)
+        self._renderer = KeptRenderer(scene.work.model, width, height, SHADOW_TEXELS if shadows else 0)
         self._every = speed / fps
         self._next = 0.0
 
@@ -168,8 +166,7 @@ class Film:
 
     def shot(self, data: Any) -> _Image:
         """Return an image of a state (`mujoco.MjData`), (height, width, 3), uint8, without keeping it."""
-        self._renderer.update_scene(data, camera=self.camera)
-        return np.array(self._renderer.render())
+        return self._renderer.draw(data, self.camera)
 
     @check_arguments
     def save(self, path: str | Path) -> None:
@@ -185,7 +182,7 @@ class Film:
 
     def close(self) -> None:
         """Free the renderer; this also happens when the film is deleted."""
-        self._close()
+        self._renderer.close()
 
 
 def check_film(path: Path) -> None:
@@ -273,7 +270,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
         require_known("camera", camera, names, rest=" Or give the result of aim_camera.")
 
 
-def _at(world: World, scene: Scene, poses: Poses) -> Any:
+def build_data(world: World, scene: Scene, poses: Poses) -> Any:
     """A new state of a world with parts at `poses`, and parts that are not named at their starts."""
     data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
@@ -281,11 +278,3 @@ def _at(world: World, scene: Scene, poses: Poses) -> Any:
     data.mocap_pos[:, 2] = -1.0  # hands are hidden below the table
     mujoco.mj_forward(world.model, data)
     return data
-
-
-def _release(renderer: Any) -> None:
-    """Close a renderer in its own OpenGL context; in another one it would free that one's resources."""
-    context = renderer._gl_context
-    if context is not None:
-        context.make_current()
-    renderer.close()

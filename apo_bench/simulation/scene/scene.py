@@ -97,7 +97,7 @@ def build_scene(
     room = room_with_parts(scenario, clearance, settings)
     shown = _compiled(scenario, with_hands(room, scenario))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics.first_link))
+    work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics))
     disable_wrist_sensors(work.model)
     if grasp == "friction":
         check_holdable(scenario, work, robot)
@@ -128,7 +128,7 @@ def scene_xml(
     """
     scene = build_scene(scenario, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s)
     room = room_with_parts(scenario, scene.clearance_mm, scene.physics)
-    spec = with_arm(room, scenario, scene.physics, scene.arm, scene.grasp, scene.kinematics.first_link)
+    spec = with_arm(room, scenario, scene.physics, scene.arm, scene.grasp, scene.kinematics)
     spec.compile()
     return str(spec.to_xml())
 

@@ -25,7 +25,14 @@ from apo_bench.simulation.execution import (
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, translate
-from apo_bench.simulation.scene import Scene, allow_sleep, get_part_pose, switch_wrist_sensors_on, take_snapshot
+from apo_bench.simulation.scene import (
+    Scene,
+    allow_sleep,
+    get_part_pose,
+    switch_wrist_sensors_on,
+    take_snapshot,
+    touches_others,
+)
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -86,6 +93,10 @@ class TipControl:
         t = start.transfer
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
         self._end = find_attach_end(t, start.grip, start.second)  # tip pose at the end of the line
+        # The part ends beside or above its goal where slides and lowering follow: pose there in the frame of its goal.
+        self._T_goal_end = (
+            pose.inverse(t.T_world_goal) @ find_attach_end(t, start.grip, None) @ pose.inverse(start.grip.T_part_tip)
+        )
         self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]  # in the frame of the tip
         self._R = frame_of_direction(t.into.direction, self._end)  # frame of the insertion axis, in the world
         self._pace = choose_pace(t, start.second)
@@ -148,18 +159,15 @@ class TipControl:
         """Return the standard deviations of front and turn in the frame of the insertion axis, (6,), [m, rad].
 
         Args:
-            covariance: Covariance of the pose of the part, (6, 6), as a twist in its own frame, [m, rad].
+            covariance: Covariance of the shift of the front and of its rotation, (6, 6), world axes, [m, rad].
         """
-        t = self.start.transfer
-        R = self._R.T @ t.T_world_goal[:3, :3]
-        # A twist (v, w) of the part shifts its front by v + w x front.
-        J = np.block([[R, -R @ pose.hat(t.foremost)], [np.zeros((3, 3)), R]])
-        return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
+        R = np.kron(np.eye(2), self._R)
+        return np.asarray(np.sqrt(np.diag(R.T @ covariance @ R)))
 
     def off(self, goals: Sequence[Array]) -> Array:
         """Return the true offset of the part from the lines to its goals, averaged over the goals, (6,), [m, rad].
 
-        For observers only, as `poses`.
+        For observers only, as `poses`. Where slides or lowering to the goal follow, the lines end before these.
 
         Args:
             goals: Goal poses of the part, (4, 4) each, world: one relative to each neighbouring part.
@@ -174,7 +182,7 @@ class TipControl:
         found = []
         for goal in goals:
             direction = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.direction
-            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]  # offset of the front
+            far = pose.apply(T, front)[0] - pose.apply(goal @ self._T_goal_end, front)[0]  # offset of the front
             turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
             across = (far - (far @ direction) * direction) @ self._R
             found.append([*across[:2], far @ direction, *turn @ self._R])
@@ -184,6 +192,33 @@ class TipControl:
         """Return the true poses of all parts, (4, 4) each, world, for observers only; no command depends on them."""
         work = self.robot.scene.work
         return {**self.start.parts, **{part: get_part_pose(work, self.robot.data, part) for part in work.free}}
+
+    @property
+    def left(self) -> float:
+        """Distance from the end of the line to the goal, [m]; above 0 if the grip changes there."""
+        return self._left
+
+    @property
+    def entrance(self) -> Array:
+        """The entrance of the hole by the robot's own estimate, (3,), world, [m]; without one, where the part ends."""
+        end = pose.apply(self._end, self._front[None])[0]
+        deep = max(self.start.transfer.entrances, default=self._left) - self._left
+        return np.asarray(end - deep * self.start.transfer.into.direction)
+
+    @property
+    def in_free_air(self) -> bool:
+        """Whether the approach has met no contact yet."""
+        return self._stopped is None
+
+    @property
+    def contact_force(self) -> Array:
+        """The true contact force on the held parts, (3,), in the frame of the insertion axis, [N]; for observers."""
+        return np.asarray(np.array(self._force) @ self._R)
+
+    @property
+    def touches(self) -> bool:
+        """Whether the held parts touch anything but the hand, for observers only."""
+        return touches_others(self.robot.scene.work, self.robot.data, self.robot.forces.held)
 
     @property
     def force_n(self) -> float:

@@ -17,8 +17,8 @@ def probe(seed: int, mm: float, method: str = "contact+probe", **more: Any) -> d
     sizes = {
         "base_error_estimate_mm": mm,
         "base_error_estimate_deg": 0.1,
-        "base_error_std_mm": 0.2,
-        "base_error_std_deg": 0.05,
+        "base_error_estimate_std_mm": 0.2,
+        "base_error_estimate_std_deg": 0.05,
     }
     given = {"ft_sensor": "wrist", "assumed_robot_error": "matched", "robot_error": "hand_eye:0.5/0.1+tool:1"}
     return {**row(method, seed), **given, **sizes, "probe_contacts": 6 + seed, "probe_contacts_rejected": seed, **more}

@@ -46,7 +46,7 @@ def test_an_episode_is_a_trial(made: Path) -> None:
     goals = [pose.unpack(np.reshape(one[f"{name}_poses"], (-1, 7))) for name in ("observed", "true", "planned")]
     errors = [np.linalg.norm((T - goals[1])[:, :3, 3]) for T in goals]
     assert errors[2] < errors[0]
-    assert np.reshape(one["covariance"], (2, 6, 6)).shape[0] == len(one["seen"]) == len(one["main_parts"])
+    assert np.reshape(one["covariance"], (2, 6, 6)).shape[0] == len(one["observed"]) == len(one["main_parts"])
     assert one["schedule"] == [1, 2]
 
 

@@ -48,7 +48,7 @@ def test_one_demonstration_is_seen_as_the_noise_model_sees_it(noise: str | type)
     )
     assert many.poses[0].tobytes() == one.poses.tobytes()
     assert many.covariance[0].tobytes() == one.covariance.tobytes()
-    assert many.seen[0].tobytes() == one.observed.tobytes()
+    assert many.observed[0].tobytes() == one.observed.tobytes()
 
 
 @pytest.mark.parametrize("noise", KINDS)
@@ -59,12 +59,12 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
         many = draw_pairs("carried_bridge", noise, 256, 4, noise_level=2.0, human_error_scale=0.0)
         xi = pose.log(pose.inverse(many.truth) @ many.poses)
         sizes = np.linalg.norm(xi.reshape(256, -1, 2, 3), axis=-1)
-        quartiles = np.quantile(sizes[many.seen], [0.25, 0.5, 0.75], axis=0)
+        quartiles = np.quantile(sizes[many.observed], [0.25, 0.5, 0.75], axis=0)
         stated = np.sqrt(np.median(np.diagonal(many.covariance, axis1=2, axis2=3), axis=0)[:, [0, 3]])
         parts = [operation.main for operation in load_scenario("carried_bridge").assembly.operations]
         first, again = next((parts.index(part), k) for k, part in enumerate(parts) if part in parts[:k])
         alike = np.corrcoef(np.log(1e-9 + sizes[:, first, 0]), np.log(1e-9 + sizes[:, again, 0]))[0, 1]
-        return np.array([*np.log(quartiles).ravel(), *np.log(stated).ravel(), 3.0 * many.seen.mean(), alike])
+        return np.array([*np.log(quartiles).ravel(), *np.log(stated).ravel(), 3.0 * many.observed.mean(), alike])
 
     together = drawn()
     monkeypatch.setattr("apo_bench.benchmark.datasets.training_pairs.observes_by_part", lambda noise: False)
@@ -87,7 +87,7 @@ def test_more_pairs_begin_with_the_same_ones() -> None:
     many = draw_pairs("dovetail", "outliers", training_pairs.BLOCK + 5, 7, noise_level=(1.0, 2.0))
     blocks = draw_endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
     first, second = next(blocks), next(blocks)
-    for name in ("poses", "covariance", "seen", "truth"):
+    for name in ("poses", "covariance", "observed", "truth"):
         np.testing.assert_array_equal(getattr(many, name)[:5], getattr(few, name))
         joined = np.concatenate([getattr(first, name), getattr(second, name)[:5]])
         np.testing.assert_array_equal(joined, getattr(many, name))

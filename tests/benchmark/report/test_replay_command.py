@@ -53,7 +53,9 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
     if missed and "no picture can be drawn here" in missed[0]:
         pytest.skip(missed[0])
     assert made[0].jpeg.startswith(b"\xff\xd8")
-    moved = [{**r, "reached": {part: [x + 30.0, *rest] for part, (x, *rest) in r["reached"].items()}} for r in trials]
+    moved = [
+        {**r, "final_poses": {part: [x + 30.0, *rest] for part, (x, *rest) in r["final_poses"].items()}} for r in trials
+    ]
     elsewhere, _ = draw_failures(choose_failures(moved, 1), write(tmp_path / "moved", moved), {})
     assert elsewhere[0].jpeg != made[0].jpeg
     page = write_report(folder, 1, draw_failures)

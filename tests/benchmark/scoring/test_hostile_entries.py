@@ -35,7 +35,7 @@ def entry(name: str, track: str = "mine", file: str = "f" * 16, cell: str = "110
     scored = TrackScore(
         file, True, score, low, high, len(cell), 3, 0.5, 0.1, 0.1, "0" * 16, "1" * 16, None, {"c": cell}
     )
-    return Entry(SCHEMA, name, name, f"apo-bench score {name}", False, {"mujoco": "3"}, "", "machine", {track: scored})
+    return Entry(SCHEMA, name, name, f"apo-bench score {name}", {"mujoco": "3"}, "", "machine", {track: scored})
 
 
 def changed(**fields: object) -> dict[str, object]:

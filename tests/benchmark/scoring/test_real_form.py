@@ -45,7 +45,7 @@ def test_the_form_makes_an_entry_that_the_judge_would_make(tmp_path: Path) -> No
     write_entry(entry, tmp_path / "entry.json")
     again = read_entry(tmp_path / "entry.json")
     assert again == entry
-    assert [line.status for line in ranked([again])] == ["real, self-reported"]
+    assert [line.status for line in ranked([again])] == ["real, self-reported, few trials"]
 
 
 def test_the_command_writes_the_entry(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -58,7 +58,7 @@ def test_the_tracks_of_the_score_are_few_and_large_enough() -> None:
         conditions = list_conditions(grids)
         assert len(conditions) * grids[0].trials >= (120 if track.name == "generated" else 470)
         assert grids[0].trials >= 10
-        assert {grid.trials for grid in track.of("contact", arm, quick=True)} == {track.quick_trials}
+        assert {grid.trials for grid in track.of("contact", arm, trials=1)} == {1}
 
 
 def test_a_program_scores_as_the_same_corrector_in_python(small: Path) -> None:
@@ -127,7 +127,6 @@ def test_what_is_wrong_is_said_in_one_sentence(
     [
         ("trials = 2", "trials = 2\nmethod = 'contact'", "a track has no method"),
         ("track/1", "track/2", "schema"),
-        ('title = "A small one"', 'title = "x"\nquick_trials = 0', "a whole number >= 1 is needed"),
         ("[track]", "[[also]]\nseed = 5\n\n[track]", "have the same seed"),
         ("[track]", "[[also]]\ntrials = 5\n\n[track]", "have the same trials"),
     ],

@@ -67,12 +67,12 @@ def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, correcto
     assert "\n" not in str(refused.value)
 
 
-def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
+def test_many_needs_a_list_and_a_corrector() -> None:
     for given in (seen(), None, [seen(), None]):
         with pytest.raises(InputError, match=r"correct_many must be a list \(each entry an Observation\)"):
             correct_many(given)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
-        correct_many([seen()], "paper")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="unknown corrector 'papers'"):
+        correct_many([seen()], "papers")
     with pytest.raises(InputError, match="the pose of operation 2 in observation 2 is not a rigid pose"):
         correct_many([seen(), edited("poses", stretched)])
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import correct
@@ -73,3 +74,32 @@ def test_an_operation_of_which_nothing_is_told_is_asked_for():
     assert correct(missed, "contact-robust", again).ok
     assert again.asked == [(0,)]
     assert correct(missed, "contact-robust", Again()).status == "not_seen"
+
+
+def exchanged(observation, k, i):
+    """The observation with the poses of two operations in each other's place."""
+    poses = np.array(observation.poses)
+    poses[[k, i]] = poses[[i, k]]
+    return replace(observation, poses=poses)
+
+
+@pytest.mark.parametrize("last", [(), (1,)])
+def test_parts_that_are_seen_in_each_others_place_twice_are_told_apart(last):
+    """Operations 2 and 3 are swapped in two observations that agree; in the second case a third one is right."""
+    name = "fixture_alignment"
+    again = Again(
+        exchanged(at_the_same_place(name, 1, 0), 1, 2), *(at_the_same_place(name, 1, number) for number in last)
+    )
+    found = correct(exchanged(look(name, 1), 1, 2), "contact-robust", again)
+    assert found.ok
+    assert_allclose(found.poses[:, :3, 3], shown(name, 1)[2].poses[:, :3, 3], atol=8e-3)
+
+
+def test_an_operation_that_was_seen_where_a_doubted_one_was_goes_with_it():
+    """Operation 2 is seen in the place of operation 3, then in that of operation 1."""
+    name = "fixture_alignment"
+    second, third = (exchanged(at_the_same_place(name, 1, number), 0, 1) for number in (0, 1))
+    again = Again(second, third)
+    found = correct(exchanged(look(name, 1), 1, 2), "contact-robust", again)
+    assert again.asked == [(1, 2), (0, 1, 2)]
+    assert_allclose(found.poses[:, :3, 3], shown(name, 1)[2].poses[:, :3, 3], atol=8e-3)

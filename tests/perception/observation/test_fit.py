@@ -11,9 +11,13 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
+from apo_bench import load_scenario
+from apo_bench.cli.app import main
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_models import find_models_info, read_symmetries
 from apo_bench.formats.bop_truth import read_truth
+from apo_bench.importers.recording.object_symmetries import find_object_symmetries
+from apo_bench.importers.recording.objects_file import read_objects
 from apo_bench.perception.observation.fitting.fit import compute_goodness_of_fit, fit_noise
 from apo_bench.perception.observation.models.empirical import format_residuals
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
@@ -117,6 +121,53 @@ def test_estimates_are_folded_by_the_symmetries_of_the_models(tmp_path: Path) ->
     folded = match_residuals(seen, read_truth(truth, seen), read_symmetries(found))
     assert_allclose(folded.shift_mm, plain.shift_mm, atol=1e-4)
     assert_allclose(folded.turn_deg, plain.turn_deg, atol=1e-4)
+
+
+def test_estimates_are_folded_by_the_symmetries_of_parts_of_a_scenario(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Half of the estimates of a stick are turned by half about an axis 60 mm from the origin of the model."""
+    drawn = made_of.draw(200, Known(missed=0.0, outliers=0.0), np.random.default_rng(4), objects=1)
+    plain = compared_files(*made_of.files(tmp_path, drawn))
+    (tmp_path / "o.toml").write_text(
+        'schema = "apo-bench/objects/1"\n[objects]\nstick = { id = 1, frame = { at_mm = [0, 60, 0] } }\n'
+    )
+    symmetries = find_object_symmetries(
+        read_objects(tmp_path / "o.toml"), load_scenario("stick_in_tower").assembly.solids
+    )
+    half = max(symmetries[1].images, key=lambda g: float(np.linalg.norm(g[:3, 3])))
+    assert np.linalg.norm(half[:3, 3]) == pytest.approx(120.0)
+    often = (np.arange(200) % 2 == 0)[:, None, None]
+    turned = drawn._replace(
+        R_seen=np.where(often, drawn.R_seen @ half[:3, :3], drawn.R_seen),
+        t_seen=np.where(often[:, 0], drawn.t_seen + drawn.R_seen @ half[:3, 3], drawn.t_seen),
+    )
+    estimates, truth = made_of.files(tmp_path, turned)
+    seen = read_results(estimates)
+    folded = match_residuals(seen, read_truth(truth, seen), symmetries)
+    assert_allclose(folded.shift_mm, plain.shift_mm, atol=1e-4)
+    assert folded.turned_in_place == 0
+    files = ("--estimates", str(estimates), "--truth", str(truth), "--objects", str(tmp_path / "o.toml"))
+    assert main(["noise", "fit", *files, "--scenario", "stick_in_tower", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outlier_rate"] == 0.0
+    assert main(["noise", "fit", *files]) == 2
+    assert "--scenario and --objects go together" in capsys.readouterr().err
+
+
+def test_a_folder_of_scenes_is_read_and_estimates_of_other_scenes_do_not_count(tmp_path: Path) -> None:
+    """Truth of scenes 1 and 2 in `val`, estimates of scenes 1 to 3: none is left over."""
+    drawn = made_of.draw(300, Known(missed=0.0, outliers=0.0), np.random.default_rng(5))
+    drawn.where[:, 0] = 1 + np.arange(300) // 100
+    for scene in (1, 2):
+        own = drawn.where[:, 0] == scene
+        (tmp_path / "val" / f"{scene:06}").mkdir(parents=True)
+        made_of.scene_gt(
+            tmp_path / "val" / f"{scene:06}" / "scene_gt.json", drawn.where[own], drawn.R[own], drawn.t[own]
+        )
+    estimates, _ = made_of.files(tmp_path, drawn)
+    residuals = compared_files(estimates, tmp_path / "val")
+    assert len(residuals.where) == residuals.is_estimated.sum() == 200
+    assert (residuals.surplus, residuals.absent) == (0, 0)
 
 
 @pytest.fixture(scope="module")
