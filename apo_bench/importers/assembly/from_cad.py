@@ -111,9 +111,8 @@ def import_parts(
             place._replace(T=place.T @ pose.at(foot), held=(i, k) in held) for k, place in enumerate(raw.places)
         ]
         called = f" ({title})" if raw.name != name else ""
-        lines.add(
-            f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces", is_note=False
-        )
+        faces = f"{len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"
+        lines.add(f"{name}{called}: {faces}", is_note=False)
         for repair in part.raw.repairs:
             lines.add(f"{name}: {repair}")
         for face, why in part.refused.items():

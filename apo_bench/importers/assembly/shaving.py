@@ -37,7 +37,7 @@ class _Cut(NamedTuple):
     """A piece of a part after a cut."""
 
     of: PosedPart
-    index: int
+    number: int
     piece: Piece
     lost_mm3: float
     """inf if nothing would be left."""
@@ -65,7 +65,7 @@ def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: flo
             if lost[least.of.name] + least.lost_mm3 > allowed[least.of.name]:
                 continue
             lost[least.of.name] += least.lost_mm3
-            pieces[least.of.file][least.index] = least.piece
+            pieces[least.of.file][least.number] = least.piece
             cut.add(least.of.file)
         lines += [
             f"'{a.name}' and '{b.name}' were drawn {1e3 * depth_m:.2g} mm inside each other where no whole face "
