@@ -15,7 +15,7 @@ from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
 from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
 from apo_bench.importers.assembly.misplaced import describe_misplaced
-from apo_bench.importers.assembly.posed_parts import read_posed
+from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
 from apo_bench.importers.assembly.shaving import shave_overlaps
 from apo_bench.importers.cad.fallback import import_solid_anyway
 from apo_bench.importers.cad.near_points import find_near_points
@@ -120,23 +120,27 @@ def import_parts(
     copies = name_places(places)
     require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
     poses = write_places(copies, folder, ", ".join(file.name for file in files))
-    for pair in combinations(read_posed(poses), 2):
+    posed = read_posed(poses, checked=False)  # each part was checked when it was written
+    for pair in combinations(posed, 2):
         if misplaced := describe_misplaced(*pair):
             lines.add(misplaced)
     if choices.fits == "auto":
-        _shave_parts(poses, parts, choices, lines)
+        _shave_parts(posed, parts, choices, lines)
     return ImportedAssembly(poses, tuple(lines.lines), tuple(lines.notes))
 
 
 def _shave_parts(
-    poses: Path, parts: Mapping[Path, tuple[ImportedPart, str]], choices: AssemblyChoices, lines: _Report
+    posed: Sequence[PosedPart],
+    parts: Mapping[Path, tuple[ImportedPart, str]],
+    choices: AssemblyChoices,
+    lines: _Report,
 ) -> None:
     """Write the parts anew that overlap others beyond their faces, with the overlaps cut off.
 
     Args:
         parts: Part file -> the imported part, and the source that its file states.
     """
-    shaved = shave_overlaps(read_posed(poses), choices.clearance_mm, choices.most_overlap_mm)
+    shaved = shave_overlaps(posed, choices.clearance_mm, choices.most_overlap_mm)
     for file, pieces in shaved.pieces.items():
         part, source = parts[file]
         hulls = tuple(

@@ -29,6 +29,7 @@ def scenario_from_poses(
         notes: Sentences about the import of the parts, for comments of the scenario file.
     """
     require(choices.up is None or choices.up in UPS, f"up must be one of {', '.join(UPS)}, got {choices.up}.")
-    made = new_upright_scenario(read_posed(poses, list(parts)), choices)
+    # The parts are checked when the scenario is loaded.
+    made = new_upright_scenario(read_posed(poses, list(parts), checked=False), choices)
     write_scenario(replace(made, notes=(*notes, *made.notes)), out, f"Assembly of {out.stem}", source)
     return made
