@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import TrialConfig, load_scenario
-from apo_bench.benchmark.datasets.images.estimate import estimate_poses
+from apo_bench.benchmark.datasets.images.estimate import estimate_images
 from apo_bench.benchmark.datasets.images.make import make_images
 from apo_bench.benchmark.scoring.images import score_poses
 from apo_bench.formats.bop import read_results
@@ -56,7 +56,7 @@ def make_split(folder: Path, split: str, trials: int, human_error_scale: float) 
     results = images / "icp.csv"
     if not results.exists():
         start = time.process_time()
-        made = estimate_poses(images, results)
+        made = estimate_images(images, results)
         print(f"{made} estimates in {time.process_time() - start:.0f} s of processor time", flush=True)
     return results
 
@@ -99,7 +99,7 @@ def describe_misses(residuals: Residuals) -> str:
     found = residuals.is_estimated
     outliers = 1.0 - residuals.is_inlier.sum() / found.sum()
     return (
-        f"Of {len(found)} parts, {100.0 * (1.0 - found.mean()):.0f} % have no estimate, those outside of the image "
+        f"Of {len(found)} parts, {100.0 * (1.0 - found.mean()):.1f} % have no estimate, those outside of the image "
         f"included; {100.0 * outliers:.1f} % of the estimates are more than 50 mm off."
     )
 
@@ -131,7 +131,7 @@ def write_page(rows: dict[float, list[dict[str, float | str]]], residuals: dict[
         "## Errors",
         "",
         "Percentiles of the errors of upright estimates within 50 mm, next to those of MegaPose on T-LESS",
-        "(`megapose-tless`), which are of photographs, and of colours alone:",
+        "(`megapose-tless`), which are of photographs:",
         "",
         *table(
             ("`icp` / MegaPose on T-LESS", *(f"{p} %" for p in PERCENTILES)), list_errors(residuals[max(residuals)])

@@ -80,7 +80,7 @@ def assembly_import(
         tuple(skip or ()),
     )
     with remove_on_failure(out.with_name(f"{out.stem}_parts")) as folder:
-        poses, _ = import_parts(files, folder, unit, choices, typer.echo)
-        typer.echo(f"Wrote {poses} and its parts")
+        made = import_parts(files, folder, unit, choices, typer.echo)
+        typer.echo(f"Wrote {made.poses} and its parts")
         source = ", ".join(file.name for file in files)
-        write_new_scenario(poses, [], source, out, choices)
+        write_new_scenario(made.poses, [], source, out, choices, made.notes)

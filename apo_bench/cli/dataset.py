@@ -191,8 +191,8 @@ def dataset_estimate(
       apo-bench dataset estimate images --out images/icp.csv
       apo-bench score contact --poses images/icp.csv --out icp.json
     """
-    from apo_bench.benchmark.datasets.images.estimate import estimate_poses
+    from apo_bench.benchmark.datasets.images.estimate import estimate_images
 
     check_output(out, "--out", ".csv")
-    made = estimate_poses(images, out)
+    made = estimate_images(images, out)
     typer.echo(f"{format_count(made, 'estimate')} in {out}")

@@ -1,6 +1,7 @@
 """The commands `apo-bench scenario list | show | new | check`."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -119,17 +120,20 @@ def parse_names(text: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
-def write_new_scenario(poses: Path, parts: list[str], source: str, out: Path, choices: "AssemblyChoices") -> None:
+def write_new_scenario(
+    poses: Path, parts: list[str], source: str, out: Path, choices: "AssemblyChoices", notes: Sequence[str] = ()
+) -> None:
     """Choose what poses leave open, and write the scenario file.
 
     Args:
         source: Name of what the poses come from.
+        notes: Sentences about the parts, for the file; they were printed already.
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
     from apo_bench.importers.assembly.scenario_writer import list_choices
 
-    made = scenario_from_poses(poses, parts, out, source, choices)
+    made = scenario_from_poses(poses, parts, out, source, choices, notes)
     typer.echo("\n".join(list_choices(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; next: apo-bench scenario check {shlex.quote(str(out))}")

@@ -110,8 +110,9 @@ def import_assembly(
         up, tuple(fixed), tuple(order), clearance_mm, max_overlap_mm, fits, fasteners, density, tuple(skip)
     )
     with remove_on_failure(target.with_name(f"{target.stem}_parts")) as folder:
-        poses, _ = import_parts(sources, folder, unit, choices)
-        scenario_from_poses(poses, (), target, ", ".join(source.name for source in sources), choices)
+        made = import_parts(sources, folder, unit, choices)
+        names = ", ".join(source.name for source in sources)
+        scenario_from_poses(made.poses, (), target, names, choices, made.notes)
     return load_scenario(target)
 
 

@@ -26,13 +26,15 @@ URDF = """<robot name="two"><link name="base"/>
 <link name="link1"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="joint1" type="revolute"><parent link="base"/><child link="link1"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="10" velocity="1"/></joint></robot>"""
+<limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
+<link name="tool"/><joint name="fixed" type="fixed"><parent link="link1"/><child link="tool"/></joint></robot>"""
 
 
 def test_a_urdf_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     model = compile_model(load_model(tmp_path / "arm.urdf", "arm"), tmp_path)
     assert [model.joint(j).name for j in range(model.njnt)] == ["joint1"]
+    assert model.body("tool").parentid == model.body("link1").id, "a link without a joint stays"
 
 
 FEATURES = """<mujoco model="strange">

@@ -24,6 +24,7 @@ from apo_bench.importers.assembly.contact_search import (
     find_walls_without_play,
 )
 from apo_bench.importers.assembly.posed_parts import PosedPart
+from apo_bench.scenario.layout_checks import DEEP_M
 from apo_bench.scenario.parts.fit_faces import mark_fit_faces
 
 _LARGEST_SHARE = 0.2
@@ -68,7 +69,7 @@ def add_clearance(
     notes = list[str]()
     for pair in combinations(parts, 2) if most_mm and clearance_mm else ():
         for own, other in _order_by_receding(pair):
-            depths = _find_tight_faces(own, other, _limit_depth(pair, most_mm))
+            depths = _find_tight_faces(own, other, limit_depth(pair, most_mm))
             before = changed[own.name].fit
             fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in depths.items()}}
             try:
@@ -93,7 +94,7 @@ def _order_by_receding(pair: tuple[PosedPart, PosedPart]) -> tuple[tuple[PosedPa
     return orders[::-1] if any(not thin.solid.rounds[face].hole for face in pressed) else orders
 
 
-def _limit_depth(pair: Sequence[PosedPart], most_mm: float) -> float:
+def limit_depth(pair: Sequence[PosedPart], most_mm: float) -> float:
     """Return the largest depth by which faces of two parts may recede, [mm]."""
     return min(most_mm, *(1e3 * _LARGEST_SHARE * float(np.ptp(each.solid.bounds, axis=0).min()) for each in pair))
 
@@ -111,7 +112,7 @@ def _find_tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mappi
     walls = find_walls_without_play(solids, {own.name: own.T, other.name: other.T}, gaps)
     # Both walls of a slot without play, even where they do not overlap.
     held = {contact for pair in walls for contact in pair}
-    deep = [(c.manipulated.face, -1e3 * gap) for c, gap in gaps.items() if c in held or gap < -NEAR_M]
+    deep = [(c.manipulated.face, -1e3 * gap) for c, gap in gaps.items() if c in held or gap < -DEEP_M]
     deep += [(face, -1e3 * play) for face, _, play in _list_rounds(own, other) if -most_mm <= 1e3 * play <= NO_PLAY_MM]
     # A face that mates with several faces recedes by the largest overlap: pairs are sorted, so the deepest wins.
     return {face: round(max(0.0, mm), _DIGITS) for face, mm in sorted(deep)}

@@ -1,20 +1,26 @@
 """Import the parts of an assembly from CAD files with one common frame, with the pose of every copy."""
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
 from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
+from apo_bench.importers.assembly.misplaced import describe_misplaced
+from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
+from apo_bench.importers.assembly.shaving import shave_overlaps
 from apo_bench.importers.cad.fallback import import_solid_anyway
 from apo_bench.importers.cad.near_points import find_near_points
-from apo_bench.importers.cad.part_import import read_raw_solids
+from apo_bench.importers.cad.part_import import ImportedPart, import_solid, read_raw_solids
+from apo_bench.importers.cad.pieces.convex_cutting import CutSolid
 from apo_bench.importers.cad.pose_file import name_places, write_places
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
@@ -35,13 +41,38 @@ def remove_on_failure(folder: Path) -> Iterator[Path]:
         raise
 
 
+class ImportedAssembly(NamedTuple):
+    """The parts of an assembly after their import."""
+
+    poses: Path
+    """The file of poses, next to the part files."""
+    lines: tuple[str, ...]
+    """A sentence for each part, warning, face that can make no contact, and solid left out."""
+    notes: tuple[str, ...]
+    """Those of the lines that concern the whole assembly, for the scenario file."""
+
+
+class _Report:
+    """The lines of a report, each also passed on as soon as it is added."""
+
+    def __init__(self, report: Callable[[str], object]) -> None:
+        self.lines: list[str] = []
+        self.notes: list[str] = []
+        self._report = report
+
+    def add(self, line: str, is_note: bool = True) -> None:
+        self.lines.append(line)
+        self.notes += [line] if is_note else []
+        self._report(line)
+
+
 def import_parts(
     files: Sequence[Path],
     folder: Path,
     unit: str | None = None,
     choices: AssemblyChoices = DEFAULT_CHOICES,
     report: Callable[[str], object] = bool,
-) -> tuple[Path, tuple[str, ...]]:
+) -> ImportedAssembly:
     """Write the parts of an assembly, each shape of a file once, and the place of every copy.
 
     The frame of a part is at its foot, wherever the file has its origin: a small error of an observed rotation then
@@ -51,9 +82,6 @@ def import_parts(
         files: One file of several solids, or several files with one common frame.
         unit: Unit of the files; None: as they state.
         report: Gets each line of the report as soon as it is known.
-
-    Returns:
-        The file of poses, and a sentence for each part, warning, face that can make no contact, and solid left out.
 
     Raises:
         InputError: A file cannot be read, or fewer than two solids make parts.
@@ -67,6 +95,7 @@ def import_parts(
     )
     folder.mkdir(parents=True, exist_ok=True)
     places: dict[str, list[SolidPlace]] = {}
+    parts: dict[Path, tuple[ImportedPart, str]] = {}
     for i, ((file, raw), others) in enumerate(zip(kept, find_near_points([raw for _, raw in kept]), strict=True)):
         name = make_part_name(raw.name, places)
         foot = _find_foot(raw)
@@ -77,30 +106,50 @@ def import_parts(
         except InputError as error:
             lines.add(f"{title} is left out: {str(error).removeprefix(f'{source}: ')}")
             continue
+        parts[part.path] = part, source
         places[name] = [
             place._replace(T=place.T @ pose.at(foot), held=(i, k) in held) for k, place in enumerate(raw.places)
         ]
         called = f" ({title})" if raw.name != name else ""
-        lines.add(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
+        faces = f"{len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"
+        lines.add(f"{name}{called}: {faces}", is_note=False)
         for repair in part.raw.repairs:
             lines.add(f"{name}: {repair}")
         for face, why in part.refused.items():
-            lines.add(f"{name}.{face} can make no contact: {why}")
+            lines.add(f"{name}.{face} can make no contact: {why}", is_note=False)
     copies = name_places(places)
     require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
-    return write_places(copies, folder, ", ".join(file.name for file in files)), tuple(lines.lines)
+    poses = write_places(copies, folder, ", ".join(file.name for file in files))
+    posed = read_posed(poses, checked=False)  # each part was checked when it was written
+    for pair in combinations(posed, 2):
+        if misplaced := describe_misplaced(*pair):
+            lines.add(misplaced)
+    if choices.fits == "auto":
+        _shave_parts(posed, parts, choices, lines)
+    return ImportedAssembly(poses, tuple(lines.lines), tuple(lines.notes))
 
 
-class _Report:
-    """The lines of a report, each also passed on as soon as it is added."""
+def _shave_parts(
+    posed: Sequence[PosedPart],
+    parts: Mapping[Path, tuple[ImportedPart, str]],
+    choices: AssemblyChoices,
+    lines: _Report,
+) -> None:
+    """Write the parts anew that overlap others beyond their faces, with the overlaps cut off.
 
-    def __init__(self, report: Callable[[str], object]) -> None:
-        self.lines: list[str] = []
-        self._report = report
-
-    def add(self, line: str) -> None:
-        self.lines.append(line)
-        self._report(line)
+    Args:
+        parts: Part file -> the imported part, and the source that its file states.
+    """
+    shaved = shave_overlaps(posed, choices.clearance_mm, choices.most_overlap_mm)
+    for file, pieces in shaved.pieces.items():
+        part, source = parts[file]
+        hulls = tuple(
+            replace(piece, name="") if isinstance(piece, Hull) else Hull("", piece.corners) for piece in pieces
+        )
+        cut = CutSolid(hulls, 1, tuple(part.cut.filled), coarse=True)
+        import_solid(part.raw, file.stem, file.parent, source, choices.density, pieces=cut)
+    for line in shaved.lines:
+        lines.add(line)
 
 
 _Found = list[tuple[str, RawSolid]]

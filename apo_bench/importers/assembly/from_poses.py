@@ -1,6 +1,7 @@
 """Make a scenario file from part files and the final poses of the parts."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.errors import require
@@ -12,7 +13,12 @@ from apo_bench.importers.assembly.up_axis import new_upright_scenario
 
 
 def scenario_from_poses(
-    poses: Path, parts: Sequence[str], out: Path, source: str, choices: AssemblyChoices
+    poses: Path,
+    parts: Sequence[str],
+    out: Path,
+    source: str,
+    choices: AssemblyChoices,
+    notes: Sequence[str] = (),
 ) -> NewScenario:
     """Choose base, order, starts and grasps of an assembly, write the scenario file, and return the scenario.
 
@@ -20,8 +26,10 @@ def scenario_from_poses(
         poses: A file of `[[pose]]` entries.
         parts: Part files; empty: part files next to the file of poses.
         source: Names of the files of the poses, for the header of the scenario file.
+        notes: Sentences about the import of the parts, for comments of the scenario file.
     """
     require(choices.up is None or choices.up in UPS, f"up must be one of {', '.join(UPS)}, got {choices.up}.")
-    made = new_upright_scenario(read_posed(poses, list(parts)), choices)
-    write_scenario(made, out, f"Assembly of {out.stem}", source)
+    # The parts are checked when the scenario is loaded.
+    made = new_upright_scenario(read_posed(poses, list(parts), checked=False), choices)
+    write_scenario(replace(made, notes=(*notes, *made.notes)), out, f"Assembly of {out.stem}", source)
     return made

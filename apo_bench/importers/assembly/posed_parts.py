@@ -61,11 +61,12 @@ class _PoseFile(FileTable, frozen=True):
     pose: list[_Pose]
 
 
-def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
+def read_posed(poses: Path, files: Sequence[str] = (), checked: bool = True) -> tuple[PosedPart, ...]:
     """Read every copy of a part that a file of poses names, each with a unique name.
 
     Args:
         files: Part files, or names of packaged parts. Other parts are read from part files next to the file of poses.
+        checked: As in `load_part`.
 
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
@@ -77,7 +78,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     used = {*_TAKEN}
     for each in stated:
         file = paths.get(each.part, poses.parent / f"{each.part}.xml")
-        solids[file] = solids[file] if file in solids else load_part(file)
+        solids[file] = solids[file] if file in solids else load_part(file, checked)
         name = find_free_name(each.name or each.part, used)
         used.add(name)
         T = pose.unpack(np.array([*np.multiply(1e-3, each.at_mm), *each.quaternion_wxyz]))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from apo_bench.errors import InputError, require
 from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
+from apo_bench.importers.assembly.enclosed_faces import add_clearance_between
 from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, find_lowest_part, new_scenario
 from apo_bench.importers.assembly.posed_parts import PosedPart, place_on_table
 
@@ -28,18 +29,45 @@ def new_upright_scenario(parts: Sequence[PosedPart], choices: AssemblyChoices = 
         choices.fits != "ask" or not fits,
         f"{len(fits)} pairs of parts have no play: {'; '.join(fits)}. Give fits = auto to change them so, or refuse.",
     )
+    scenario, assumed = _try_fastened(parts, choices)
+    if choices.most_overlap_mm:
+        parts, between = add_clearance_between(parts, scenario.order, clearance_mm)
+        if between:
+            scenario, assumed = _try_fastened(parts, choices)
+            notes += between
+    return replace(scenario, notes=(*fits, *notes, *assumed, *scenario.notes))
+
+
+def _try_fastened(parts: Sequence[PosedPart], choices: AssemblyChoices) -> tuple[NewScenario, tuple[str, ...]]:
+    """Make the scenario; if there is no order, take what nothing carries to be fastened, and note it."""
+    try:
+        return _try_axes(parts, choices), ()
+    except (NoAssemblyOrder, InputError):
+        if choices.fasteners != "clamp":
+            raise
+        # What nothing carries in the finished assembly is held by something that the file does not show.
+        scenario = _try_axes([replace(each, held=True) for each in parts], choices)
+        marked = {each.name for each in parts if each.held}
+        return scenario, tuple(
+            f"nothing carries '{placing.moves[0]}' at its place, and no fastener is drawn: it is taken to be fastened "
+            "there, and clamped"
+            for placing in scenario.order
+            if placing.clamped and placing.moves[0] not in marked
+        )
+
+
+def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenario:
+    """Make the scenario with the stated axis up, or with z or the axis with the fewest parts that cannot be grasped."""
     up = choices.up
-    notes = (*fits, *notes)
     found: dict[str, NewScenario] = {}
     failed: dict[str, NoAssemblyOrder | InputError] = {}
     for axis in (up,) if up else _UP_AXES:
         try:
-            scenario = _try_bases(place_on_table(parts, axis), choices)
+            found[axis] = _try_bases(place_on_table(parts, axis), choices)
         except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
-        found[axis] = replace(scenario, notes=(*notes, *scenario.notes))
-        if not scenario.unfit:  # all parts can be grasped, so no other axis is tried
+        if not found[axis].unfit:  # all parts can be grasped, so no other axis is tried
             break
     if not found:
         raise next(iter(failed.values()))  # that of the first axis

@@ -65,7 +65,13 @@ def sample_surface_points(mesh: Mesh, step: float) -> Array:
 
 def _round_to_grid(points: Array) -> Array:
     """Return points rounded to a grid of half a step, each grid point once."""
-    return np.unique(np.round(2.0 * points / _STEP_MM), axis=0) * _STEP_MM / 2.0
+    if not len(points):
+        return points
+    cells = np.round(2.0 * points / _STEP_MM).astype(np.int64)
+    low = cells.min(axis=0)
+    shape = np.ptp(cells, axis=0) + 1
+    numbers = np.unique(np.ravel_multi_index(tuple((cells - low).T), tuple(shape)))
+    return (np.column_stack(np.unravel_index(numbers, tuple(shape))) + low) * _STEP_MM / 2.0
 
 
 def _list_free_shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:

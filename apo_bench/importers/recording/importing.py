@@ -35,7 +35,6 @@ from apo_bench.scenario import Scenario, place_layout
 class ImportedRecording:
     """An observation from a recording, with the intermediate results that led to it."""
 
-    scenario: Scenario
     observation: Observation
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
@@ -94,7 +93,7 @@ def import_recording(
     followed = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
-    chosen = arrangement.order.intervals
+    chosen = arrangement.order
     operations = tuple(observed_operation(followed, intervals, chosen, assembly, X, k) for k in range(len(assembly)))
     check_moved(intervals, operations, camera, assembly, file)
     observed = np.array([operation.rest is not None for operation in operations])
@@ -123,9 +122,7 @@ def import_recording(
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
     wrong = {part: int(each.sum()) for part, each in gross.items()}
     doubts = (*other, *list_doubts(followed, wrong, arrangement, covariance, assembly))
-    return ImportedRecording(
-        scenario, observation, arrangement, operations, covariance, followed, turned, wrong, doubts
-    )
+    return ImportedRecording(observation, arrangement, operations, covariance, followed, turned, wrong, doubts)
 
 
 def arrange_tracks(tracks: Mapping[str, PoseTrack], task: Task) -> tuple[Mapping[str, FoldedTrack], Arrangement]:

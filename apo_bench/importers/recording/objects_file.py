@@ -67,18 +67,11 @@ def read_objects(path: str | Path) -> ObjectsFile:
 
 
 def _read_part(value: Any, place: str) -> TrackedPart:
-    """Read the table of a part, or a list of tables, one for each of its tags."""
-    ids: list[str] = []
-    frames: dict[str, Array] = {}
-    for each in value if isinstance(value, list) else [value]:
-        stated = convert_typed(each, ObjectTable, place)
-        own = [str(name) for name in (stated.id if isinstance(stated.id, list) else [stated.id])]
-        require(own, f"{place}: an id of the log is needed.")
-        ids += own
-        if stated.frame is not None:
-            frames[own[0]] = stated.frame.matrix(f"{place}, frame")
-    require(len(ids) == len({*ids}) and ids, f"{place}: an id stands twice, or none is given.")
-    return TrackedPart(tuple(ids), frames.pop(ids[0], np.eye(4)), frames)
+    """Read the table of a part."""
+    stated = convert_typed(value, ObjectTable, place)
+    ids = tuple(str(name) for name in (stated.id if isinstance(stated.id, list) else [stated.id]))
+    require(ids and len(ids) == len({*ids}), f"{place}: an id of the log is needed, and each one once.")
+    return TrackedPart(ids, np.eye(4) if stated.frame is None else stated.frame.matrix(f"{place}, frame"), {})
 
 
 def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:

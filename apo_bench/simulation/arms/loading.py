@@ -33,6 +33,7 @@ def load_model(path: Path, kind: str) -> Any:
         spec = _read(path)
     except (ValueError, RuntimeError, mujoco.FatalError, ElementTree.ParseError) as error:
         raise InputError(f"{path}: MuJoCo cannot read this model file of the {kind}: {_reason(error)}.") from error
+    spec.compiler.fusestatic = False  # else a URDF arm loses the base of its gripper
     for plural in _OF_THE_SCENE:
         for each in list(getattr(spec, plural)):
             spec.delete(each)

@@ -46,6 +46,7 @@ _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the
 _FIRM_N = 80.0
 """Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
 an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
+_SEAT_N = 2.0  # least force limit of a motion that ends on the seat of a part that is clamped to a fixed one
 _CARRIES = 0.1
 """A face carries weight if the vertical component of its normal is at least this."""
 _FINGER_M = 0.01
@@ -164,7 +165,12 @@ def _transfer(
     ways = list_entrance_distances(assembly, comes, after, into.direction)
     # A hand that does not hold firmly is slow from the first entrance on.
     first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
-    near = [weight[p] for p in list_neighbours(contacts, operation.moves) if p in weight]
+    clamps = list_clamps(scene.scenario)
+    clamps_to = clamps.get(part, "") if operation.clamped and not undo else ""
+    loose = [p for p in list_neighbours(contacts, operation.moves) if p in weight and p not in clamps]
+    near = [weight[p] for p in loose]
+    # A part that is clamped to a fixed one may be pressed against it; no other part could slide.
+    seat_n = _SEAT_N if clamps_to in assembly.fixed else 0.0
     return Transfer(
         part=part,
         carried=operation.carries,
@@ -182,11 +188,12 @@ def _transfer(
         entrances=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
-        insert_n=_INSERT_WEIGHTS * min(near, default=held),
-        slide_n=_SLIDE_WEIGHTS * min(near, default=held),
+        insert_n=max(_INSERT_WEIGHTS * min(near, default=held), seat_n),
+        slide_n=max(_SLIDE_WEIGHTS * min(near, default=held), seat_n),
         clearance=1e-3 * scene.clearance_mm,
-        clamps_to="" if undo else list_clamps(scene.scenario).get(part, "") if operation.clamped else "",
+        clamps_to=clamps_to,
         lands=not operation.clamped or any(each.normal[2] > _CARRIES for each in comes.touched),
+        roofed=any(each.normal[2] < -_CARRIES for each in comes.touched),
         front=_front(scene, part, operation.moves, after, into.direction) if spiral and inserts else None,
     )
 

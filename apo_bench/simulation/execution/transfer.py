@@ -127,6 +127,8 @@ class Transfer:
     """The part to which the part is clamped once its seat is felt; empty if it is not clamped."""
     lands: bool = True
     """Whether another part carries it at its goal, so that a level motion ends by lowering it."""
+    roofed: bool = False
+    """Whether it touches a face above it at its goal, so that it must not be too high there."""
     front: Array | None = None
     """Foremost point of the moved parts on the way to the goal, in the frame of the part, (3,), [m]; None if the robot
     does not search for the hole."""
@@ -173,7 +175,7 @@ class Transfer:
     @property
     def floats(self) -> float:
         """Height by which a part that was observed on the floor of its slot must rise to be free on all sides, [m]."""
-        return 0.5 * self.clearance if self.lands else 0.0
+        return 0.5 * self.clearance if self.lands or not self.roofed else 0.0
 
     def with_tip_at(self, T: Array) -> "Transfer":
         """Return the transfer of a robot whose real tip is at T, (4, 4), in the frame of the estimated tip."""

@@ -56,7 +56,8 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
         hands.move((0, smooth_trajectory(beside, goal, _SHIFT)))
         hands.wait(0.05)
     if operation.clamps_to:
-        weld_clamp(hands.world, hands.data, operation.part, operation.clamps_to)
+        # A hand yields a little; the screws draw the part to where the human holds it.
+        weld_clamp(hands.world, hands.data, operation.part, operation.clamps_to, operation.target)
     hands.let_go(0, operation.part, *operation.carries)
     hands.wait(STAND_STILL_S)
 

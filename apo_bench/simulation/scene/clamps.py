@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from apo_bench.geometry import pose
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.frames import body_frame, quaternion
 from apo_bench.simulation.scene.world import CLAMP, World
@@ -14,11 +14,16 @@ def list_clamps(scenario: Scenario) -> dict[str, str]:
     return {each.main: each.contacts[0].environment.part for each in clamped}
 
 
-def weld_clamp(world: World, data: Any, part: str, other: str) -> None:
-    """Fix a part to another one at their present poses."""
+def weld_clamp(world: World, data: Any, part: str, other: str, T_world_part: Array | None = None) -> None:
+    """Fix a part to another one.
+
+    Args:
+        T_world_part: Pose to which the part is drawn, (4, 4); None: its present pose.
+    """
     model = world.model
     weld = model.equality(f"{CLAMP}{part}").id
-    T = pose.inverse(body_frame(data, world.body[other])) @ body_frame(data, world.body[part])
+    at = body_frame(data, world.body[part]) if T_world_part is None else T_world_part
+    T = pose.inverse(body_frame(data, world.body[other])) @ at
     # MuJoCo's data of a weld: anchor (3), relative position (3), quaternion (4), torque scale (1).
     model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *quaternion(T), 1)
     data.eq_active[weld] = 1

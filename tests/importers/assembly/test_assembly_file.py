@@ -26,7 +26,7 @@ def stl(folder: Path, *solids: object) -> Path:
 def test_solids_that_touch_are_parts_with_frames_of_their_own(tmp_path: Path) -> None:
     base = block(60, 40, 10, (100, 0, 0)) - rod(6, 10, (100, 0, 0))
     lid = block(40, 30, 8, (100, 0, 10))
-    poses, said = import_parts([stl(tmp_path, base, lid)], tmp_path / "parts")
+    poses, said, _ = import_parts([stl(tmp_path, base, lid)], tmp_path / "parts")
     assert len(said) == 2
     parts = {each.name: each for each in read_posed(poses)}
     places = {each.solid.volume: 1e3 * each.T[:3, 3] for each in parts.values()}
@@ -45,6 +45,6 @@ def test_solids_that_touch_are_parts_with_frames_of_their_own(tmp_path: Path) ->
 def test_the_frame_of_a_turned_part_lies_on_its_axis(tmp_path: Path) -> None:
     """With 41 facets the middle of the box is off the axis by a part of their sagitta."""
     pin = Manifold.cylinder(30, 8, 8, 41).translate((20, 5, 10))
-    poses, _ = import_parts([stl(tmp_path, block(90, 60, 10, (0, 0, 0)), pin)], tmp_path / "parts")
+    poses, _, _ = import_parts([stl(tmp_path, block(90, 60, 10, (0, 0, 0)), pin)], tmp_path / "parts")
     found = next(each for each in read_posed(poses) if each.solid.rounds)
     np.testing.assert_allclose(1e3 * found.T[:3, 3], (20, 5, 10), atol=1.1e-3)

@@ -61,10 +61,10 @@ def test_a_headed_shank_that_overlaps_a_hole_as_a_thread_does_is_a_fastener(tmp_
 
 def test_fasteners_are_left_out_and_what_they_touch_is_marked(tmp_path: Path) -> None:
     given = files(tmp_path, plate=PLATE, cover=COVER, a=SCREW, lid=block(20, 20, 5, (20, 0, 30)))
-    poses, lines = import_parts(given, tmp_path / "parts", "mm")
+    poses, lines, _ = import_parts(given, tmp_path / "parts", "mm")
     assert {each.name: each.held for each in read_posed(poses)} == {"plate": True, "cover": True, "lid": False}
     assert any(line.startswith("a: a fastener (its shank overlaps a hole") for line in lines)
-    poses, _ = import_parts(given, tmp_path / "all", "mm", AssemblyChoices(fasteners="parts"))
+    poses, _, _ = import_parts(given, tmp_path / "all", "mm", AssemblyChoices(fasteners="parts"))
     assert {each.name for each in read_posed(poses)} == {"plate", "cover", "a", "lid"}
 
 
@@ -79,7 +79,7 @@ def test_a_solid_is_skipped_as_asked_and_one_that_makes_no_part_is_left_out(tmp_
     ball = tmp_path / "ball.stl"
     trimesh.creation.icosphere(3, 5.0).apply_translation((0, 0, 60)).export(ball)
     given = [*files(tmp_path, plate=PLATE, cover=COVER, lid=block(20, 20, 5, (20, 0, 30))), ball]
-    poses, lines = import_parts(given, tmp_path / "parts", "mm", AssemblyChoices(skip=("lid",)))
+    poses, lines, _ = import_parts(given, tmp_path / "parts", "mm", AssemblyChoices(skip=("lid",)))
     assert {each.name for each in read_posed(poses)} == {"plate", "cover"}
     assert {line for line in lines if "left out" in line} == {
         "lid is left out, as asked",
@@ -98,7 +98,9 @@ def hanging(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plate = extrude(make_rectangle(10, 76), 0, 40, bottom="foot", top="top")
     parts = made(folder, wall=(wall, (0, 0, 0)), plate=(plate, (-15, 0, 25)))
     with pytest.raises(NoAssemblyOrder, match="nothing is below 'plate' that would carry it"):
-        new_upright_scenario(parts, UP)
+        new_upright_scenario(parts, replace(UP, fasteners="parts"))
+    (note,) = new_upright_scenario(parts, UP).notes
+    assert note.startswith("nothing carries 'plate' at its place, and no fastener is drawn")
     found = new_upright_scenario(tuple(replace(each, held=each.name == "plate") for each in parts), UP)
     write_scenario(found, folder / "own.toml", "own", "a test")
     return folder / "own.toml"

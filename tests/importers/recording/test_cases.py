@@ -201,6 +201,7 @@ TEXTS: Mapping[str, Callable[[], str]] = {
     ),
     "one id for two parts": lambda: bop([*logged()]),
     "two tags": lambda: table([(t, "23", T @ TAG) if n == "13" and t > 106.5 else (t, n, T) for t, n, T in logged()]),
+    "an id that changes": lambda: table([(t, "23" if n == "13" and t > 106.5 else n, T) for t, n, T in logged()]),
     "two tags at once": lambda: table(
         [
             row
@@ -266,7 +267,7 @@ def test_a_log_gives_the_rests_of_the_recording(name: str, tmp_path: Path) -> No
     parts = dict(PARTS)
     if name == "one id for two parts":
         parts = {part: one._replace(ids=("2" if part == "stick" else "1",)) for part, one in PARTS.items()}
-    if name.startswith("two tags"):
+    if name.startswith("two tags") or name == "an id that changes":
         parts["stick_tag2"] = TrackedPart(("23",), np.eye(4), {})
     found = imported(path, parts)
     # The camera is solved from other frames, and rests have fewer: both errors are within the stated deviations.

@@ -1,0 +1,106 @@
+"""Take off what no receding face explains where parts overlap a little: one of two convex pieces is cut along a plane.
+
+Faces recede as a whole (`added_clearance`). What overlaps beyond them, such as the lip of a snap fit or a rounded edge,
+is cut off at the plane across which the two pieces overlap least, and by the clearance behind it.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import manifold3d
+import numpy as np
+
+from apo_bench.geometry import Array, Hull, Piece, measure_intrusion, pose
+from apo_bench.importers.assembly.added_clearance import add_clearance, limit_depth
+from apo_bench.importers.assembly.misplaced import find_least_overlap, measure_depth
+from apo_bench.importers.assembly.posed_parts import PosedPart
+from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners
+from apo_bench.scenario.layout_checks import DEEP_M
+
+_LARGEST_LOSS = 0.02
+"""Largest share of the volume of a part that is taken off it against one other part."""
+_NO_FLATS = np.zeros((0, 4))
+
+
+class ShavedPieces(NamedTuple):
+    """The pieces of parts after overlaps were cut off."""
+
+    pieces: dict[Path, list[Piece]]
+    """Part file -> all of its pieces; only parts that were cut."""
+    lines: tuple[str, ...]
+    """One sentence for each pair: depth as drawn, volume taken off, and the play that results."""
+
+
+class _Cut(NamedTuple):
+    """A piece of a part after a cut."""
+
+    of: PosedPart
+    number: int
+    piece: Piece
+    lost_mm3: float
+    """inf if nothing would be left."""
+
+
+def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: float) -> ShavedPieces:
+    """Cut off overlaps of parts up to a depth that remain after faces have receded.
+
+    Args:
+        clearance_mm: Gap that the cuts leave.
+        most_mm: Parts with a deeper overlap stay as drawn.
+    """
+    receded, _, _ = add_clearance(parts, clearance_mm, most_mm)
+    pieces: dict[Path, list[Piece]] = {each.file: list(each.solid.pieces) for each in parts}
+    cut = set[Path]()
+    lines = list[str]()
+    for a, b in combinations(receded, 2):
+        depth_m = measure_intrusion(a.solid, a.T, b.solid, b.T)
+        if not DEEP_M < depth_m <= 1e-3 * limit_depth((a, b), most_mm):
+            continue
+        lost = {a.name: 0.0, b.name: 0.0}
+        allowed = {each.name: 1e9 * _LARGEST_LOSS * each.solid.volume for each in (a, b)}
+        for p, q in _list_deep_pieces(a, b):
+            least = min(_cut_apart(a, p, b, q, pieces, clearance_mm), key=lambda each: each.lost_mm3)
+            if lost[least.of.name] + least.lost_mm3 > allowed[least.of.name]:
+                continue
+            lost[least.of.name] += least.lost_mm3
+            pieces[least.of.file][least.number] = least.piece
+            cut.add(least.of.file)
+        lines += [
+            f"'{a.name}' and '{b.name}' were drawn {1e3 * depth_m:.2g} mm inside each other where no whole face "
+            f"explains it: {volume:.3g} mm^3 of '{name}' are taken off, which leaves {clearance_mm:g} mm of play"
+            for name, volume in lost.items()
+            if volume > 0.0
+        ]
+    return ShavedPieces({file: pieces[file] for file in cut}, tuple(lines))
+
+
+def _list_deep_pieces(a: PosedPart, b: PosedPart) -> Iterator[tuple[Piece, Piece]]:
+    """Yield the pairs of pieces of two parts that are inside each other."""
+    for p in a.solid.pieces:
+        if measure_depth(a.T, (p,), b.T, b.solid.pieces) > DEEP_M:
+            yield from ((p, q) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
+
+
+def _cut_apart(
+    a: PosedPart, p: Piece, b: PosedPart, q: Piece, pieces: dict[Path, list[Piece]], clearance_mm: float
+) -> Iterator[_Cut]:
+    """Yield the two ways to cut apart pieces p of part a and q of part b: off the first, and off the second."""
+    for (own, mine), (other, its) in (((a, p), (b, q)), ((b, q), (a, p))):
+        T = pose.inverse(own.T) @ other.T
+        there = Hull(its.name, pose.apply(T, its.corners))
+        n, at = find_least_overlap(mine, there)
+        index = next(i for i, each in enumerate(pieces[own.file]) if each.name == mine.name)
+        yield _cut_piece(own, index, pieces[own.file][index], n, 1e3 * at - clearance_mm)
+
+
+def _cut_piece(of: PosedPart, index: int, piece: Piece, n: Array, d_mm: float) -> _Cut:
+    """Cut a piece along a plane, and keep what is below it, n . x <= d, [mm]."""
+    body: Any = manifold3d.Manifold.hull_points(1e3 * piece.corners)
+    below = body.trim_by_plane(-n, -d_mm)
+    corners = list_body_corners(below)
+    lost = float(body.volume() - below.volume())
+    if len(corners) < 4 or not is_thick(corners):
+        return _Cut(of, index, piece, np.inf)
+    return _Cut(of, index, Hull(piece.name, 1e-3 * list_hull_corners(corners, _NO_FLATS)), lost)

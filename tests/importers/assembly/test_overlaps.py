@@ -1,0 +1,69 @@
+"""Overlaps that no face explains are cut off pieces; a part that a small shift would free is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+import apo_bench
+from apo_bench.geometry import measure_intrusion, pose
+from apo_bench.importers.assembly.from_cad import import_parts
+from apo_bench.importers.assembly.misplaced import describe_misplaced
+from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
+from apo_bench.scenario.parts.making import bore, extrude, make_rectangle, make_shaft
+from tests.importers.assembly.test_blocked import made
+from tests.importers.cad.made import block, write_stl
+
+STAND = block(60, 50, 10) + block(10, 50, 30, (-25, 0, 10))
+LUG = block(20, 20, 20, (-9, 0, 10)) + Manifold.sphere(3, 24).translate((-17.3, 0, 20))
+
+
+def test_a_bump_inside_a_wall_is_cut_off_with_the_clearance_and_the_scenario_states_it(tmp_path: Path) -> None:
+    files = [write_stl(solid, tmp_path / f"{name}.stl") for name, solid in (("stand", STAND), ("lug", LUG))]
+    poses, lines, notes = import_parts(files, tmp_path / "parts", "mm")
+    assert set(notes) <= set(lines)
+    (line,) = (note for note in notes if "no whole face explains it" in note)
+    assert line.startswith("'stand' and 'lug' were drawn 0.3 mm inside each other")
+    assert "mm^3 of 'lug' are taken off, which leaves 0.25 mm of play" in line
+    stand, lug = read_posed(poses)
+    shifted = lug.T @ pose.at((-2.4e-4, 0, 1e-6))
+    assert measure_intrusion(stand.solid, stand.T, lug.solid, shifted) == 0.0
+    assert {"nz", "pz"} <= {*lug.solid.faces}, "the seat stays"
+    scenario = apo_bench.import_assembly(files, tmp_path / "own.toml", unit="mm")
+    assert len(scenario.assembly.operations[0].contacts) == 1
+    assert "no whole face explains it" in (tmp_path / "own.toml").read_text(encoding="utf-8")
+    with pytest.raises(RuntimeError, match=r"'stand' and 'lug' are 0\.\d+ mm inside each other"):
+        apo_bench.import_assembly(files, tmp_path / "other.toml", unit="mm", fits="refuse")
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[PosedPart, PosedPart]:
+    """A plate with a hole that is 0.2 mm wider than its pin, on each side."""
+    plate = extrude(make_rectangle(60, 60), 0, 15, bores=[bore((0, 0), 5.2, 0, 15, "bore")], bottom="under", top="over")
+    pin = make_shaft(5, 0, 40, "side", bottom="tip", top="head")
+    return made(tmp_path_factory.mktemp("fitted"), plate=(plate, (0, 0, 0)), pin=(pin, (0, 0, 0)))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("shift_mm", [0.5, 2.0])
+@pytest.mark.parametrize("deg", range(0, 360, 72))
+def test_a_pin_that_was_moved_into_the_wall_of_its_hole_is_named(
+    fitted: tuple[PosedPart, PosedPart], shift_mm: float, deg: float
+) -> None:
+    plate, pin = fitted
+    off = 1e-3 * shift_mm * np.array([np.cos(np.radians(deg)), np.sin(np.radians(deg)), 0.0])
+    sentence = describe_misplaced(replace(pin, T=pose.at(off) @ pin.T), plate)
+    assert sentence.startswith("'pin' is")
+    assert "on one side only" in sentence
+
+
+def test_what_has_play_or_is_too_thick_all_around_is_not_named(
+    fitted: tuple[PosedPart, PosedPart], tmp_path: Path
+) -> None:
+    plate, pin = fitted
+    assert describe_misplaced(pin, plate) == ""
+    (thick,) = made(tmp_path, pin=(make_shaft(5.4, 0, 40, "side", bottom="tip", top="head"), (0, 0, 0)))
+    assert describe_misplaced(thick, plate) == ""
