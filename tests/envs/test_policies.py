@@ -74,9 +74,9 @@ def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_on_where_it_is
     searcher = Searcher(env)
     stop(searcher, 10)
     assert [searcher(observe(48.0 - k, 0.0))[2] for k in range(8)][-1] > 0.0
-    rubbed = [searcher(observe(40.0, 0.0, side=(0.5, 0.0))) for _ in range(4)][-1]
-    assert rubbed[2] == -1.0
-    assert rubbed[0] > 0.0
+    rubbed = [searcher(observe(40.0, 0.0, side=(0.5, 0.0))) for _ in range(4)]
+    assert [action[2] for action in rubbed] == [-1.0, 0.0, 0.0, 0.0]  # it takes the last millimetre back, and stands
+    assert rubbed[-1][0] > rubbed[0][0]
     stuck = np.array([searcher(observe(40.0, 1.0)) for _ in range(80)])
     assert np.ptp(stuck[40:, 1]) > 0.1
 
