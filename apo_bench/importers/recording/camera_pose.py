@@ -75,6 +75,9 @@ def find_cameras(
         "the camera file states neither where the camera stands nor the place of a part that rests in the log; add a "
         'table [pose], or [known] with parts such as castle1 = "start", which is a place of a scenario.',
     )
+    # A part that was hidden when the log began may have left its known place.
+    sure = {part: T for part, T in places.items() if part in fixed or not intervals[part][0].rests[0].hidden}
+    places = sure or places
     means = {part: intervals[part][0].rests[0].mean for part in places}
     return solve_cameras(places, means, rest_error(camera, next(iter(means.values()))), solids or {})
 

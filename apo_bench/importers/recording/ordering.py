@@ -63,8 +63,7 @@ def find_order(
 ) -> Chosen:
     """Return the best choice of intervals.
 
-    Dynamic programming over operations: what follows depends on a choice nearly only by its last interval, so the best
-    of the choices that end with the same interval is kept.
+    Dynamic programming over operations: of all choices from which later operations go on alike, the best is kept.
 
     Args:
         intervals: Rest intervals of every tracked part, in the frame of the camera.
@@ -89,7 +88,8 @@ def find_order(
         longer = [each for choice in choices for each in _lengthen(choice, assembly, intervals, worth, unseen)]
         if not longer:
             break
-        choices = [*{each.intervals[-1]: each for each in sorted(longer, key=lambda each: each.value)}.values()]
+        longer.sort(key=lambda each: each.value)  # of equal states, the best and last one is kept
+        choices = [*{_state(each, assembly): each for each in longer}.values()]
     reached = len(choices[0].intervals)
     after_end = [_count_unexplained(each.intervals, np.inf, assembly, intervals) for each in choices]
     choices = [each._replace(unexplained=each.unexplained + n) for each, n in zip(choices, after_end, strict=True)]
@@ -181,6 +181,12 @@ def _lengthen(
     is_lost = known[-1].ends < max(each[-1].ends for each in intervals.values()) - _LOST_S
     if k in unseen or is_lost or any(each.rests[0].hidden for each in known):
         yield _Choice(choice.worth - _SKIPPED * (k not in unseen), choice.unexplained, (*choice.intervals, None))
+
+
+def _state(choice: _Choice, assembly: Assembly) -> Chosen:
+    """Return what later operations depend on: the last interval, and those of parts that they move again."""
+    later = {operation.main for operation in assembly.operations[len(choice.intervals) :]}
+    return (choice.intervals[-1], *(each for each in choice.intervals if each is not None and each.part in later))
 
 
 def _count_unexplained(chosen: Chosen, until: float, assembly: Assembly, intervals: RestIntervals) -> int:
