@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 MADE = {
     "replays": ("block_on_block", "dovetail", "--episodes", "2", "--noise-level", "2", "--method", "contact"),
-    "insertions": ("block_on_block", "--episodes", "2", "--record", "insertions"),
+    "insertions": ("block_on_block", "--episodes", "2", "--episode-type", "insertions"),
 }
 NEEDS = {
     "lerobot": ("lerobot[dataset,training]", str(ROOT)),

@@ -38,7 +38,7 @@ Examples:
   apo-bench dataset make stick_in_tower --format bop --episodes 20 --out images
 """
 commands = make_group("dataset", _HELP)
-_WITHOUT_EFFECT = ("noise_level", "noise", "method", "robot_error", "arm", "record", "policy")
+_WITHOUT_EFFECT = ("noise_level", "noise", "method", "robot_error", "arm", "episode_type", "policy")
 """Options without a meaning for images."""
 _SPLITS = ("test", "val")
 """Splits of images; the seeds of the second are those of trials for training."""
@@ -76,7 +76,7 @@ def dataset_make(
         typer.Option(help=f"First seed; default: {FIRST_TRAINING_TRIAL}, or 0 for test images."),
     ] = None,
     format: Annotated[str, typer.Option(help="parquet, lerobot, minari, or bop (images).")] = "parquet",
-    record: Annotated[
+    episode_type: Annotated[
         str | None, typer.Option(help="replays (default), or insertions (APOInsert-v0 with a policy).")
     ] = None,
     policy: Annotated[
@@ -92,7 +92,7 @@ def dataset_make(
     """Run trials and write observations, plans, true poses and frames, or images, as a data set.
 
     Examples:
-      apo-bench dataset make dovetail --format lerobot --record insertions --policy expert --out inserted
+      apo-bench dataset make dovetail --format lerobot --episode-type insertions --policy expert --out inserted
       apo-bench dataset make stick_in_tower --format bop --episodes 20 --out images
     """
     command = shlex.join(["apo-bench", *sys.argv[1:]])
@@ -104,9 +104,9 @@ def dataset_make(
         trials = _list_trials(
             (scenario, *(more or ())), options, FIRST_TRAINING_TRIAL if seed is None else seed, episodes
         )
-        _make_episodes(trials, out, command, format, record or "replays", policy)
+        _make_episodes(trials, out, command, format, episode_type or "replays", policy)
         return
-    for name, value in (options | {"record": record, "policy": policy}).items():
+    for name, value in (options | {"episode_type": episode_type, "policy": policy}).items():
         flag = f"--{name.replace('_', '-')}"
         require(value is None or name not in _WITHOUT_EFFECT, f"{flag} has no effect on images; leave it out.")
     if secret is not None:
@@ -132,19 +132,21 @@ def _list_trials(names: Sequence[str], options: dict[str, Any], seed: int, episo
 
 
 def _make_episodes(
-    trials: Sequence[TrialConfig], out: Path, command: str, format: str, record: str, policy: str | None
+    trials: Sequence[TrialConfig], out: Path, command: str, format: str, episode_type: str, policy: str | None
 ) -> None:
     """Run trials and write a data set to learn from."""
     from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 
-    require(record in ("replays", "insertions"), f"--record must be replays or insertions, got {record}.")
+    require(
+        episode_type in ("replays", "insertions"), f"--episode-type must be replays or insertions, got {episode_type}."
+    )
     seed = trials[0].seed
     require(
         seed >= FIRST_TRAINING_TRIAL,
         f"--seed must be at least {FIRST_TRAINING_TRIAL}, since smaller seeds are for evaluation, got {seed}.",
     )
-    insertions = record == "insertions"
-    require(policy is None or insertions, f"--policy {policy} belongs to insertions; add --record insertions.")
+    insertions = episode_type == "insertions"
+    require(policy is None or insertions, f"--policy {policy} belongs to insertions; add --episode-type insertions.")
     led_by = (policy or "expert") if insertions else None
     with name_write_errors():
         made, right = make_dataset(trials, out, command, format, led_by, partial(typer.echo, err=True))
@@ -189,8 +191,8 @@ def dataset_estimate(
       apo-bench dataset estimate images --out images/icp.csv
       apo-bench score contact --poses images/icp.csv --out icp.json
     """
-    from apo_bench.benchmark.datasets.images.estimate import estimate_poses
+    from apo_bench.benchmark.datasets.images.estimate import estimate_images
 
     check_output(out, "--out", ".csv")
-    made = estimate_poses(images, out)
+    made = estimate_images(images, out)
     typer.echo(f"{format_count(made, 'estimate')} in {out}")

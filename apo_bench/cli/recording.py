@@ -43,7 +43,7 @@ def recording_import(
     ] = None,
     unobserved: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
     picture: Annotated[Path | None, make_path_option("Draw frames, paths and rests: .png.")] = None,
-    paths: Annotated[Path | None, make_path_option("Write the paths between rests: .csv.")] = None,
+    paths_out: Annotated[Path | None, make_path_option("Write the paths between rests: .csv.")] = None,
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations.
 
@@ -60,11 +60,11 @@ def recording_import(
     inputs = (log, camera, objects)
     check_output(out, "--out", ".json", ".csv", inputs=inputs)
     check_output(picture, "--picture", ".png", inputs=inputs)
-    check_output(paths, "--paths", ".csv", inputs=inputs)
-    planned = out.suffix.lower() == ".json" or operation_ends or unobserved or paths
+    check_output(paths_out, "--paths-out", ".csv", inputs=inputs)
+    planned = out.suffix.lower() == ".json" or operation_ends or unobserved or paths_out
     require(
         scenario is not None or not planned,
-        "--out .json, --operation-ends, --unobserved and --paths need --scenario; add it.",
+        "--out .json, --operation-ends, --unobserved and --paths-out need --scenario; add it.",
     )
     task = None if scenario is None else load_scenario(scenario)
     solids = {} if task is None else task.assembly.solids
@@ -76,10 +76,10 @@ def recording_import(
         lines, doubts = _import_alone(read, stated, matched, out, picture)
     else:
         order = _parse_order(operation_ends, unobserved, len(task.assembly))
-        files = (out, picture, paths)
+        files = (out, picture, paths_out)
         lines, doubts = _import_for_scenario(read, named.models, stated, matched, task, scenario, order, files)
     print_columns([*lines, *(("warning", text) for text in (*matched.doubts, *doubts))])
-    print_written(out, paths, picture)
+    print_written(out, paths_out, picture)
 
 
 def _import_for_scenario(
@@ -92,7 +92,7 @@ def _import_for_scenario(
     from apo_bench.importers.recording.importing import import_recording
     from apo_bench.importers.recording.text import PATH_HEAD, describe_recording, path_rows
 
-    out, picture, paths = files
+    out, picture, paths_out = files
     try:
         imported = import_recording(
             matched.tracks, camera, task, order, log.file, models, matched.identical, matched.offsets
@@ -112,8 +112,8 @@ def _import_for_scenario(
         write_form(make_observation_form(imported.observation, name), out)
     else:
         _write_table(out, mains, rests, imported.observation.poses, imported.covariance)
-    if paths is not None:
-        write_csv(paths, PATH_HEAD, path_rows(imported))
+    if paths_out is not None:
+        write_csv(paths_out, PATH_HEAD, path_rows(imported))
     placed = list(zip(mains, rests, strict=True))
     _draw(f"{log.file}, {task.name}", imported.tracks, found, placed, picture)
     return describe_recording(log, matched, imported.folded, imported.gross, found, placed), imported.doubts

@@ -26,7 +26,7 @@ class APOAssemble(APOInsert):
 
     ## Rewards
     1.0 at the end if the judge finds the whole assembly correct, else 0.0. With `reward="progress"` also, in each of n
-    operations, the share of the hole that the part enters, 1 / n in total. `force_penalty` as in `APOInsert-v0`.
+    operations, the reward for the depth in the hole, 1 / n in total. `force_penalty` as in `APOInsert-v0`.
 
     ## Starting State
     That of `APOInsert-v0` at the first operation.

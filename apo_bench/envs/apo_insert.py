@@ -109,8 +109,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     ## Rewards
     `reward="sparse"`: 1.0 at the end if the judge finds the operation and those before it correct, else 0.0.
-    `reward="progress"` adds the share of the hole that the part enters for the first time, by the true poses; 1.0 in
-    total. Each newton above `penalised_n` costs `force_penalty` per action.
+    `reward="progress"` adds what the square of the deepest share of the hole that the part entered grows by, by the
+    true poses; 1.0 in total. Each newton above `penalised_n` costs `force_penalty` per action.
 
     ## Starting State
     `reset(seed=k)` and `reset(options={"trial": k})` start at trial k. A trial below 100000 that fails before the

@@ -22,8 +22,9 @@ _PROGRESS_MM = 0.05  # least progress of an action that is not stopped
 _NEAR_MM = 1.0  # distance left below which a stop is no reason to search
 _SIGMAS = 2.5  # half axes of the largest ellipse, in stated standard deviations,
 _PLAY_MM = 0.3  # less this: a smaller error needs no search
+_WIDER = 0.25  # growth of the half axes with each further search
 _MOST_MM = 3.0  # greatest half axis
-_PITCH_MM = 0.5  # growth of the larger half axis with each turn
+_PITCH_MM = 0.35  # growth of the larger half axis with each turn
 _SPEED_MM = 0.25  # along the ellipse with each action
 _YAWS = (0.0, 1.0, -1.0, 2.0, -2.0)  # turns about the axis, one for each search, in stated standard deviations
 _CALM = 25  # actions without resistance for which the approach goes on alone
@@ -32,6 +33,7 @@ _HELD_MM = 0.4  # the same where walls push it from the side
 _HELD_N = 1.2  # by this side force
 _YIELD_MM_N = 0.6  # displacement of the tip by a side force with each action
 _YIELD_MM = 0.2  # greatest displacement of an action
+_ROOM_MM = 1.2  # greatest displacement in the hole from where it was found
 _DEAD_N = 0.02  # side force that is noise
 _RUB_N = 0.06  # side force in the hole above which the part stands
 _DRIVE_N = 0.2  # push below which the part goes in faster than the approach
@@ -52,6 +54,8 @@ class Searcher:
         self._force = np.zeros(3)  # filtered, [N]
         self._best = math.inf  # smallest distance left in this phase, [mm]
         self._waited = 0  # actions since then
+        self._left = math.inf  # distance left at the last action, [mm]
+        self._gained = 0.0  # by the last action, [mm]
         self._stopped = 0.0  # distance left at which contact stopped the part, [mm]
         self._press = 0.1  # push at that moment, [N]
         self._angle = 0.0  # along the ellipses, [rad]
@@ -60,6 +64,8 @@ class Searcher:
     def __call__(self, observation: Mapping[str, Any]) -> Array:
         self._force += _FILTER * (np.asarray(observation["wrench"][:3], np.float64) - self._force)
         left = float(observation["plan"][3])
+        self._gained = self._left - left
+        self._left = left
         progress = left < self._best - _PROGRESS_MM
         self._waited = 0 if progress else self._waited + 1
         self._best = min(self._best, left)
@@ -69,10 +75,8 @@ class Searcher:
         return with_hand(self._env, action)
 
     def _approach(self, left: float, deviations: Array) -> float:
-        """Leave the motion to the approach until contact stops it, or walls rub."""
-        if math.hypot(*self._force[:2]) > _RUB_N:
-            self._phase = self._go_in
-        elif self._waited >= _STALLED and left > _NEAR_MM:
+        """Leave the motion to the approach until contact stops it."""
+        if self._waited >= _STALLED and left > _NEAR_MM:
             self._press = max(-float(self._force[2]), 0.1)
             self._begin_search(left)
         return 0.0
@@ -90,13 +94,14 @@ class Searcher:
         is_held = math.hypot(*self._force[:2]) > _HELD_N and left < self._stopped - _HELD_MM
         if is_held or left < self._stopped - _DEEP_MM:
             self._phase = self._go_in
+            self._middle = self._target[:2].copy()
             self._best, self._waited = left, 0
             return 0.0
         if -float(self._force[2]) > self._press / 4:
             self._waited = 0
         if 0 < self._waited < _CALM:
             return 0.0
-        axes = np.clip(_SIGMAS * deviations[:2] - _PLAY_MM, 0.0, _MOST_MM)
+        axes = np.clip(_SIGMAS * deviations[:2] - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
         self._middle += np.where(axes > 0.0, 0.0, self._yielded())
         largest = float(axes.max())
         whole = 2 * math.pi * max(math.ceil(largest / _PITCH_MM), 1)  # angle of all turns
@@ -114,9 +119,11 @@ class Searcher:
         if self._waited > _STUCK and left > _NEAR_MM:
             self._begin_search(left)
             return 0.0
-        self._target[:2] += self._yielded()
-        if math.hypot(*self._force[:2]) > _RUB_N:
-            return -1.0
+        self._target[:2] = self._middle + np.clip(
+            self._target[:2] + self._yielded() - self._middle, -_ROOM_MM, _ROOM_MM
+        )
+        if math.hypot(*self._force[:2]) > _RUB_N:  # take back the last progress, but draw no part out
+            return -float(np.clip(self._gained, 0.0, 1.0))
         return _DRIVE if -float(self._force[2]) < _DRIVE_N else 0.0
 
     def _yielded(self) -> Array:

@@ -91,7 +91,7 @@ class ImageDescription(FileTable, frozen=True):
         return pose.at(1e-3 * np.array(self.centers_mm[str(number)]))
 
 
-def read_description(folder: Path) -> ImageDescription:
+def read_image_description(folder: Path) -> ImageDescription:
     """Read `apo_trials.json` in the folder of a data set.
 
     Raises:

@@ -28,7 +28,7 @@ def rows(rate: float) -> list[dict[str, float | str]]:
 
 def test_missing_estimates_and_outliers_are_counted() -> None:
     said = images.describe_misses(residuals([1.0, 2.0, np.nan, 60.0, 3.0]))
-    assert "Of 5 parts, 20 % have no estimate" in said
+    assert "Of 5 parts, 20.0 % have no estimate" in said
     assert "25.0 % of the estimates are more than 50 mm off" in said
 
 

@@ -39,7 +39,7 @@ def run(folder: Path, *more: str) -> int:
 
 def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wanted = place_layout(load_scenario(NAME), 0.1, 0.0, 0.3).poses
-    extra = ("--picture", str(folder / "p.png"), "--paths", str(folder / "p.csv"))
+    extra = ("--picture", str(folder / "p.png"), "--paths-out", str(folder / "p.csv"))
     for out, more in (("a.json", ("--scenario", NAME, *extra)), ("a.csv", ("--scenario", NAME)), ("b.csv", ())):
         assert run(folder, "--out", str(folder / out), *more) == 0
         found = read_observation(folder / out, NAME)

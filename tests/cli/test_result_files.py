@@ -29,7 +29,7 @@ COMMANDS = {
         "fit.toml fit.csv fit.png"
     ),
     f"recording import {LOG} --objects objects.toml --scenario stick_in_tower --out seen.json --picture seen.png "
-    "--paths seen_paths.csv": "seen.json seen.png seen_paths.csv",
+    "--paths-out seen_paths.csv": "seen.json seen.png seen_paths.csv",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
     "run block_on_block --save-observation saved.json --video film.gif --fidelity near-contact": "saved.json film.gif",
     "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",

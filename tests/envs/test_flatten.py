@@ -30,5 +30,7 @@ def test_a_flat_action_is_the_action_of_the_environment() -> None:
     seen, _ = flat.reset(seed=3)
     entries = np.concatenate([each.ravel() for _, each in sorted(plain.reset(seed=3)[0].items())])
     np.testing.assert_allclose(seen, entries, rtol=1e-6)
+    with pytest.raises(apo_bench.InputError, match=r"shape \(3,\) from 0 to 0 was given .* shape \(12,\)"):
+        flat.step(np.zeros(3, np.float32))
     action = np.linspace(-1.0, 1.0, 12, dtype=np.float32)
     np.testing.assert_allclose(flat._action(action), plain.action_space.high * action.reshape(2, 6), rtol=1e-6)

@@ -94,3 +94,21 @@ def test_the_wrist_sensors_are_off_unless_switched_on(tower: Scene) -> None:
             raise RuntimeError
         assert model.sensor_needstage[-2:].tolist() == [3, 3]
     assert model.sensor_needstage[-2:].tolist() == [0, 0]
+
+
+def test_many_readings_at_once_are_those_one_by_one(tower: Scene) -> None:
+    rows = np.random.default_rng(2).normal(size=(70, 6))
+    one, many = (wrist(tower, FtNoise(0.1, 0.005)) for _ in range(2))
+    for row in rows:
+        one.signal[:] = row
+        one.sensor.take(0.001)
+    for some in np.split(rows, [20, 30, 50]):
+        many.sensor.take_rows(some, 0.001)
+    about = one.sensor._sensor()[:3, 3]
+    # the same sums in another order
+    np.testing.assert_allclose(many.sensor.wrench(about), one.sensor.wrench(about), rtol=1e-9, atol=1e-12)
+    half = wrist(tower, FtNoise(0.0, 0.0))
+    half.sensor.take_rows(np.repeat(rows, 2, axis=0), 0.0005)
+    none = wrist(tower, FtNoise(0.0, 0.0))
+    none.sensor.take_rows(rows, 0.001)
+    np.testing.assert_allclose(half.sensor.wrench(about), none.sensor.wrench(about), rtol=1e-9, atol=1e-12)

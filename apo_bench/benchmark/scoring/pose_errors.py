@@ -26,6 +26,7 @@ _WIDTH_PX = 640.0
 _ADD_SHARES = np.array([0.1])
 """Threshold of ADD(-S), relative to the diameter."""
 _LEAST_VISIBLE = 0.1
+_FEW_SYMMETRIES = 64  # up to so many, all vertices count
 _NOTHING = ObjectSymmetry(np.eye(4)[None])
 
 
@@ -36,6 +37,9 @@ class EvaluatedModel:
 
     vertices: Array
     """(n, 3), [mm]."""
+    corners: Array
+    """(k, 3), those for MSSD and MSPD, [mm]: with many symmetries only the corners of the convex hull. No other vertex
+    moves farther, and in the image none by more than the perspective within the part."""
     diameter_mm: float
     symmetries: Array
     """(m, 4, 4), displacements after which it looks the same, the identity first, [mm]."""
@@ -91,7 +95,9 @@ def _read_models(folder: Path) -> dict[int, EvaluatedModel]:
     for name, entry in read_plain(place / MODELS_INFO, "sizes of models", syntax="json").items():
         number = int(name)
         mesh: Any = trimesh.load(place / f"obj_{number:06d}.ply", process=False)
-        models[number] = EvaluatedModel(np.array(mesh.vertices), entry["diameter"], known.get(number, _NOTHING).images)
+        symmetries = known.get(number, _NOTHING).images
+        corners = (mesh if len(symmetries) <= _FEW_SYMMETRIES else mesh.convex_hull).vertices
+        models[number] = EvaluatedModel(np.array(mesh.vertices), np.array(corners), entry["diameter"], symmetries)
     return models
 
 
@@ -120,19 +126,20 @@ def compute_errors(truth: Array, seen: Array, model: EvaluatedModel, K: Array) -
     """Errors of each pair of a true pose and an estimate, (k, j, 3): MSSD / diameter, MSPD [pixels], ADD / diameter."""
     errors = np.zeros((len(truth), len(seen), 3))
     for k, T in enumerate(truth):
-        alike = pose.apply_all(T @ model.symmetries, model.vertices)
+        alike = pose.apply_all(T @ model.symmetries, model.corners)
         for j, estimate in enumerate(seen):
-            points = pose.apply(estimate, model.vertices)
+            points = pose.apply(estimate, model.corners)
             mssd = np.linalg.norm(alike - points, axis=2).max(axis=1).min()
             mspd = np.linalg.norm(_project(K, alike) - _project(K, points), axis=2).max(axis=1).min()
-            errors[k, j] = mssd / model.diameter_mm, mspd, _compute_add(alike[0], points, model) / model.diameter_mm
+            errors[k, j] = mssd / model.diameter_mm, mspd, _compute_add(T, estimate, model) / model.diameter_mm
     return errors
 
 
-def _compute_add(true: Array, points: Array, model: EvaluatedModel) -> float:
+def _compute_add(T: Array, estimate: Array, model: EvaluatedModel) -> float:
     """Mean distance of vertices; of a symmetric object that of each to the nearest one."""
     from scipy.spatial import KDTree
 
+    true, points = (pose.apply(each, model.vertices) for each in (T, estimate))
     if len(model.symmetries) == 1:
         return float(np.linalg.norm(true - points, axis=1).mean())
     return float(KDTree(points).query(true)[0].mean())

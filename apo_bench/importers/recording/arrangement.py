@@ -15,7 +15,6 @@ from apo_bench.importers.recording.identical_parts import list_matchings
 from apo_bench.importers.recording.ordering import (
     Chosen,
     NoMatchingOrder,
-    Order,
     Stated,
     end_of_operation,
     find_order,
@@ -35,7 +34,8 @@ class Arrangement(NamedTuple):
     """The camera pose, the starts and the order of operations that a log gives, and how well they fit."""
 
     camera: CameraPose
-    order: Order
+    order: Chosen
+    """The rest interval that ends each operation."""
     start: Poses
     """Start of every part, world, [m]."""
     start_source: Mapping[str, str]
@@ -110,15 +110,15 @@ def _arrange_seen(intervals: RestIntervals, solved: CameraPose, task: Task) -> A
     else:
         order = find_order(assembly, intervals, expected, X, stated.unseen)
     intervals, order = _image_as_in_contact(assembly, intervals, order, expected, goals, X)
-    start, source = find_starts(intervals, order.intervals, X, task)
+    start, source = find_starts(intervals, order, X, task)
     fits = {
         k: contact_fit(
             assembly,
             k,
-            {**start, **_reached(assembly, intervals, order.intervals, k, X)},
+            {**start, **_reached(assembly, intervals, order, k, X)},
             unknown_parts(order, assembly, k),
         )
-        for k, interval in enumerate(order.intervals)
+        for k, interval in enumerate(order)
         if interval is not None
     }
     return Arrangement(solved, order, start, source, fits, intervals)
@@ -131,10 +131,10 @@ def _reached(assembly: Assembly, intervals: RestIntervals, chosen: Chosen, k: in
     return {part: X @ T for part, T in poses.items()}
 
 
-def unknown_parts(order: Order, assembly: Assembly, k: int) -> set[str]:
+def unknown_parts(order: Chosen, assembly: Assembly, k: int) -> set[str]:
     """Return the parts that were moved last, until operation k, by an operation that was not observed."""
     last = {part: j for j, operation in enumerate(assembly.operations[: k + 1]) for part in operation.moves}
-    return {part for part, j in last.items() if order.intervals[j] is None}
+    return {part for part, j in last.items() if order[j] is None}
 
 
 def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Array) -> tuple[RestInterval, ...]:
@@ -149,16 +149,16 @@ def _image_as_planned(known: Sequence[RestInterval], solid: Solid, expected: Arr
 
 
 def _image_as_in_contact(
-    assembly: Assembly, intervals: RestIntervals, order: Order, start: Poses, goals: Array, X: Array
-) -> tuple[RestIntervals, Order]:
+    assembly: Assembly, intervals: RestIntervals, order: Chosen, start: Poses, goals: Array, X: Array
+) -> tuple[RestIntervals, Chosen]:
     """Return intervals with the images of placed parts that make contact, and their order.
 
     Between frames, or while it is hidden, a part may turn so far that another image is nearer than its own. Of images
     that fit alike, a part that was hidden has that which is turned least from the plan.
     """
     changed = dict(intervals)
-    chosen = order.intervals
-    for k, interval in enumerate(order.intervals):
+    chosen = order
+    for k, interval in enumerate(order):
         if interval is None:
             continue
         reached = {**start, **_reached(assembly, changed, chosen, k, X)}
@@ -177,17 +177,11 @@ def _image_as_in_contact(
                 first = intervals[part].index(interval) if part == interval.part else 0
                 turned = [each.turn(turns[best]) for each in changed[part][first:]]
                 changed[part] = (*changed[part][:first], *turned)
-                chosen = _same_intervals(order.intervals, intervals, changed)
+                chosen = tuple(each and changed[each.part][intervals[each.part].index(each)] for each in order)
                 reached = {**reached, part: T @ turns[best]}
             if min(wrong) < _OTHER_IMAGE_MM:
                 break
-    rival = order.rival and _same_intervals(order.rival, intervals, changed)
-    return changed, Order(chosen, rival)
-
-
-def _same_intervals(chosen: Chosen, intervals: RestIntervals, changed: RestIntervals) -> Chosen:
-    """Return the changed intervals that take the place of chosen ones."""
-    return tuple(each and changed[each.part][intervals[each.part].index(each)] for each in chosen)
+    return changed, chosen
 
 
 def find_starts(intervals: RestIntervals, chosen: Chosen, X: Array, task: Task) -> tuple[Poses, Mapping[str, str]]:

@@ -8,10 +8,9 @@ from apo_bench.assembly import Assembly
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.arrangement import Arrangement
 from apo_bench.importers.recording.averaging import per_axis
-from apo_bench.importers.recording.rest_intervals import RestIntervals
 from apo_bench.importers.recording.tracks import PoseTrack, span_of
 
-_MANY = 0.25  # share of outliers among the frames of a rest that is doubtful
+_MANY = 0.25  # share of frames of a part that were left out, which is doubtful
 _HIDDEN_S = 0.5  # a part without frames for so long, and for so many usual steps, was hidden
 _HIDDEN_FRAMES = 5
 _OPEN_MM = 3.0  # smallest gap of a doubtful contact
@@ -21,7 +20,7 @@ _OPEN_DEVIATIONS = 5.0  # standard deviations of the pose, added to the gap abov
 
 def list_doubts(
     tracks: Mapping[str, PoseTrack],
-    intervals: RestIntervals,
+    gross: Mapping[str, int],
     arrangement: Arrangement,
     covariance: Array,
     assembly: Assembly,
@@ -30,47 +29,32 @@ def list_doubts(
 
     Args:
         tracks: Track of each part, camera from part.
+        gross: Part -> number of frames that were left out, as they are far from the frames around.
         covariance: Covariance of each observed pose, (n, 6, 6), [m, rad].
     """
     return (
+        *_gross(tracks, gross),
         *_not_observed(arrangement, assembly),
-        *_rivals(arrangement),
-        *_outliers(intervals, arrangement),
         *_open_contacts(arrangement, covariance, assembly),
-        *_pauses(intervals, arrangement, assembly),
+        *_pauses(arrangement, assembly),
         *_hidden(tracks),
     )
 
 
+def _gross(tracks: Mapping[str, PoseTrack], gross: Mapping[str, int]) -> Iterator[str]:
+    """Yield a sentence for each part of which many frames were left out."""
+    for part, n in gross.items():
+        if n > _MANY * (n + len(tracks[part].t)):
+            yield (
+                f"{n} of {n + len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
+            )
+
+
 def _not_observed(arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
     """Yield a sentence for each operation whose end was not observed."""
-    for k, interval in enumerate(arrangement.order.intervals):
+    for k, interval in enumerate(arrangement.order):
         if interval is None:
             yield f"operation {k + 1} ({assembly.operations[k].main}) was not observed, so its pose is unknown"
-
-
-def _outliers(intervals: RestIntervals, arrangement: Arrangement) -> Iterator[str]:
-    """Yield a sentence for each placed part of whose frames at rest many are wrong."""
-    for interval in arrangement.order.intervals:
-        if interval is None:
-            continue
-        inlier = np.concatenate([rest.mean.inlier for rest in interval.rests])
-        if (~inlier).mean() > _MANY:
-            yield (
-                f"{(~inlier).sum()} of {len(inlier)} frames of '{interval.part}' at rest from {interval.begins:.2f} s "
-                "on are outliers; if the tracker flips it, check the picture for its right pose"
-            )
-
-
-def _rivals(arrangement: Arrangement) -> Iterator[str]:
-    """Yield a sentence for each operation that may as well have ended at another time."""
-    chosen, rival = arrangement.order
-    for k, (mine, other) in enumerate(zip(chosen, rival or chosen, strict=True)):
-        if mine is not None and other is not None and mine is not other:
-            yield (
-                f"operation {k + 1} ({mine.part}) ended at {mine.begins:.2f} s or {other.begins:.2f} s, which are "
-                "about as likely; state the right times by --operation-ends"
-            )
 
 
 def _open_contacts(arrangement: Arrangement, covariance: Array, assembly: Assembly) -> Iterator[str]:
@@ -85,12 +69,11 @@ def _open_contacts(arrangement: Arrangement, covariance: Array, assembly: Assemb
             )
 
 
-def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
-    """Yield a sentence for each part that is not carried and rested at times that no operation ended."""
-    carried = {part for operation in assembly.operations for part in operation.carries}
-    for part, known in intervals.items():
-        pauses = [f"{each.begins:.2f} s" for each in known[1:] if each not in arrangement.order.intervals]
-        if pauses and part not in carried:
+def _pauses(arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
+    """Yield a sentence for each part that rested more often than operations ended with it."""
+    for part, known in arrangement.intervals.items():
+        pauses = [f"{each.begins:.2f} s" for each in known[1:] if each not in arrangement.order]
+        if len(pauses) > sum(part in operation.carries for operation in assembly.operations):
             times = ", ".join(pauses)
             yield f"'{part}' also rested at {times}, counted as pauses; state --operation-ends if it was put down"
 

@@ -142,7 +142,8 @@ def measure_distances(solid: Solid | None, T: Array, other: Array) -> Array:
     Args:
         solid: Shape of the part; None: no symmetry is known.
     """
-    apart = np.linalg.norm(T[..., :3, 3] - other[..., :3, 3], axis=-1)
+    centre = np.append(np.zeros(3) if solid is None else solid.centroid, 1.0)  # the point that no symmetry moves
+    apart = np.linalg.norm((T @ centre - other @ centre)[..., :3], axis=-1)
     return np.asarray(apart + _M_PER_RAD * _turn_between(solid, T, other))
 
 

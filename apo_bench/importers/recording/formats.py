@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import require, require_known
 from apo_bench.importers.recording.camera_file import Conventions
-from apo_bench.importers.recording.log_columns import MATRIX, POSITION, LogColumn
+from apo_bench.importers.recording.log_columns import LogColumn
 from apo_bench.importers.recording.log_json import read_json_tables
 from apo_bench.importers.recording.log_poses import orient, read_rows
 from apo_bench.importers.recording.log_tables import LogTable, read_text_tables
@@ -36,7 +36,7 @@ FORMATS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """Name of a format -> beginnings of what files are recognised as."""
-_SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat", ".log", ".json", ".jsonl", ".npy")  # of logs in a folder
+_SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat", ".log", ".json", ".jsonl")  # of logs in a folder
 _MATRIX_FOLDER = "ob_in_cam"  # in which FoundationPose writes one matrix for each image
 _MOST_IN_IMAGE = 50  # rows of a file for one image
 _NO_NAMES = (_MATRIX_FOLDER, "pose", "poses")  # folders that name no object
@@ -89,11 +89,6 @@ def _list_files(path: Path) -> Sequence[Path]:
 
 
 def _read_file(path: Path, how: Conventions) -> list[LogTable]:
-    if path.suffix.lower() == ".npy":
-        T = np.load(path, allow_pickle=False).reshape(-1, 4, 4)
-        cells = dict(zip(MATRIX + POSITION, [*T[:, :3, :3].reshape(-1, 9).T, *T[:, :3, 3].T], strict=True))
-        columns = {meaning: LogColumn(meaning) for meaning in cells}
-        return [LogTable(path, "matrices of NumPy", path.stem, columns, cells, [str(path)] * len(T))]
     if path.suffix.lower() in (".json", ".jsonl"):
         return read_json_tables(path)
     return read_text_tables(path, how.columns)

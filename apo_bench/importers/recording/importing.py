@@ -29,15 +29,12 @@ from apo_bench.perception.observation.models import (
 )
 from apo_bench.scenario import Scenario, place_layout
 
-_MANY = 0.25  # share of gross frames of a part that is doubtful
-
 
 @final
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
     """An observation from a recording, with the intermediate results that led to it."""
 
-    scenario: Scenario
     observation: Observation
     arrangement: Arrangement
     operations: tuple[LoggedOperation, ...]
@@ -96,7 +93,7 @@ def import_recording(
     followed = {part: folded[own].track for part, own in owned.items()}
     intervals = arrangement.intervals
     X = arrangement.camera.T_world_camera
-    chosen = arrangement.order.intervals
+    chosen = arrangement.order
     operations = tuple(observed_operation(followed, intervals, chosen, assembly, X, k) for k in range(len(assembly)))
     check_moved(intervals, operations, camera, assembly, file)
     observed = np.array([operation.rest is not None for operation in operations])
@@ -124,15 +121,8 @@ def import_recording(
         observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     turned = {part: int(each.turned.sum()) for part, each in folded.items()}
     wrong = {part: int(each.sum()) for part, each in gross.items()}
-    many = tuple(
-        f"{n} of {len(tracks[part].t)} frames of '{part}' are far from the frames around, and were left out"
-        for part, n in wrong.items()
-        if n > _MANY * len(tracks[part].t)
-    )
-    doubts = (*other, *many, *list_doubts(followed, intervals, arrangement, covariance, assembly))
-    return ImportedRecording(
-        scenario, observation, arrangement, operations, covariance, followed, turned, wrong, doubts
-    )
+    doubts = (*other, *list_doubts(followed, wrong, arrangement, covariance, assembly))
+    return ImportedRecording(observation, arrangement, operations, covariance, followed, turned, wrong, doubts)
 
 
 def arrange_tracks(tracks: Mapping[str, PoseTrack], task: Task) -> tuple[Mapping[str, FoldedTrack], Arrangement]:

@@ -53,7 +53,7 @@ def read_json_tables(path: Path) -> list[LogTable]:
         InputError: The file is no JSON, or no pose stands in it.
     """
     by_names: dict[tuple[str, ...], list[tuple[list[Any], str]]] = {}
-    for place, document in _documents(path):
+    for place, document in _list_documents(path):
         for fields in _walk(document, {}):
             names = tuple(sorted(fields))
             by_names.setdefault(names, []).append(([fields[name] for name in names], place))
@@ -68,18 +68,17 @@ def read_json_tables(path: Path) -> list[LogTable]:
     return tables
 
 
-def _documents(path: Path) -> Iterator[tuple[str, Any]]:
-    """Yield each document with its location in the file."""
+def _list_documents(path: Path) -> list[tuple[str, Any]]:
+    """Return each document with its location in the file."""
     text = read_text(path, "log", LARGEST_LOG_BYTES)
+    lines = [(f"{path}, line {i}", line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
     try:
         try:
-            yield str(path), json.loads(text)
+            return [(str(path), json.loads(text))]
         except ValueError:
-            lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
             if len(lines) < 2:
                 raise
-            documents = [(f"{path}, line {i}", json.loads(line)) for i, line in lines]
-            yield from documents
+            return [(place, json.loads(line)) for place, line in lines]
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: this is not JSON ({str(error)[:80]}); give one document, or one a line.") from error
 
@@ -119,13 +118,9 @@ def _shared_fields(value: Mapping[str, Any]) -> dict[str, Any]:
             found["id"] = str(own).strip("/")
     for key, own in value.items():
         column = find_column(key)
-        if column is None or column.of or column.meaning not in SHARED or column.meaning == "id":
-            if key in ("sec", "secs") and isinstance(own, int | float):
-                found["secs"] = own
-            continue
-        if isinstance(own, int | float):
-            name = "secs" if column.meaning == "sec" else column.meaning
-            found[f"{name}_{column.unit}" if column.unit else name] = own
+        is_shared = column is not None and not column.of and column.meaning in SHARED and column.meaning != "id"
+        if column is not None and is_shared and isinstance(own, int | float):
+            found[f"{column.meaning}_{column.unit}" if column.unit else column.meaning] = own
     return found
 
 

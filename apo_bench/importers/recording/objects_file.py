@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, final
 
+import numpy as np
+
 from apo_bench.errors import require
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array
 from apo_bench.importers.recording.camera_file import NamedEntries
 from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
@@ -65,18 +67,11 @@ def read_objects(path: str | Path) -> ObjectsFile:
 
 
 def _read_part(value: Any, place: str) -> TrackedPart:
-    """Read the table of a part, or a list of tables, one for each of its tags."""
-    ids: list[str] = []
-    frames: dict[str, Array] = {}
-    for each in value if isinstance(value, list) else [value]:
-        stated = convert_typed(each, ObjectTable, place)
-        own = [str(name) for name in (stated.id if isinstance(stated.id, list) else [stated.id])]
-        require(own, f"{place}: an id of the log is needed.")
-        ids += own
-        if stated.frame is not None:
-            frames[own[0]] = stated.frame.matrix(f"{place}, frame")
-    require(len(ids) == len({*ids}) and ids, f"{place}: an id stands twice, or none is given.")
-    return TrackedPart(tuple(ids), frames.pop(ids[0], pose.at((0.0, 0.0, 0.0))), frames)
+    """Read the table of a part."""
+    stated = convert_typed(value, ObjectTable, place)
+    ids = tuple(str(name) for name in (stated.id if isinstance(stated.id, list) else [stated.id]))
+    require(ids and len(ids) == len({*ids}), f"{place}: an id of the log is needed, and each one once.")
+    return TrackedPart(ids, np.eye(4) if stated.frame is None else stated.frame.matrix(f"{place}, frame"), {})
 
 
 def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
@@ -91,10 +86,9 @@ def merge_tags(objects: ObjectsFile, known: Collection[str]) -> ObjectsFile:
         if name in parts or not of:
             parts.setdefault(name, tracked)
             continue
-        part = max(of, key=len)
-        ids = (*parts[part].ids, *tracked.ids)
-        stated = (
-            {} if (tracked.T_model_part == pose.at((0.0, 0.0, 0.0))).all() else {tracked.ids[0]: tracked.T_model_part}
-        )
-        parts[part] = TrackedPart(ids, parts[part].T_model_part, {**parts[part].others, **stated, **tracked.others})
+        first = parts[max(of, key=len)]
+        is_stated = not (tracked.T_model_part == np.eye(4)).all()
+        stated = {tracked.ids[0]: tracked.T_model_part} if is_stated else {}
+        others = {**first.others, **stated, **tracked.others}
+        parts[max(of, key=len)] = TrackedPart((*first.ids, *tracked.ids), first.T_model_part, others)
     return ObjectsFile(objects.file, parts, objects.ignored)

@@ -27,8 +27,6 @@ _SKIPPED = 8.0
 _LOST_S = 0.5  # a part that is seen at rest no more this long before the end of the log was lost, or not put down
 _OVERLAP_S = 0.5
 """An operation may take its part this much earlier than the part of the previous operation comes to rest."""
-_CLOSE = 0.3
-"""A second choice whose worth differs by less is a rival."""
 
 
 class Stated(NamedTuple):
@@ -48,14 +46,6 @@ class NoMatchingOrder(InputError):
     """The motions in the log do not match the operations of the scenario."""
 
 
-class Order(NamedTuple):
-    """The rest intervals that end the operations."""
-
-    intervals: Chosen
-    rival: Chosen | None
-    """A second choice that is nearly as good, if there is one."""
-
-
 class _Choice(NamedTuple):
     """A choice of intervals for the first operations, with its worth."""
 
@@ -70,11 +60,11 @@ class _Choice(NamedTuple):
 
 def find_order(
     assembly: Assembly, intervals: RestIntervals, start: Poses, T_world_camera: Array, unseen: Sequence[int]
-) -> Order:
-    """Return the best choice of intervals, with its rival.
+) -> Chosen:
+    """Return the best choice of intervals.
 
-    Dynamic programming over operations: what follows depends on a choice nearly only by its last interval, so the two
-    best choices that end with the same interval are kept.
+    Dynamic programming over operations: what follows depends on a choice nearly only by its last interval, so the best
+    of the choices that end with the same interval is kept.
 
     Args:
         intervals: Rest intervals of every tracked part, in the frame of the camera.
@@ -99,20 +89,19 @@ def find_order(
         longer = [each for choice in choices for each in _lengthen(choice, assembly, intervals, worth, unseen)]
         if not longer:
             break
-        choices = _keep_best(longer)
+        choices = [*{each.intervals[-1]: each for each in sorted(longer, key=lambda each: each.value)}.values()]
     reached = len(choices[0].intervals)
-    choices = [_count_rest(choice, assembly, intervals) for choice in choices]
+    after_end = [_count_unexplained(each.intervals, np.inf, assembly, intervals) for each in choices]
+    choices = [each._replace(unexplained=each.unexplained + n) for each, n in zip(choices, after_end, strict=True)]
     if reached < len(assembly):  # the log may end before the last operations, if it shows no others
         choices = [each for each in choices if any(each.intervals) and not each.unexplained]
     if not choices:
         raise _explain_order(assembly, intervals, reached)
-    best = sorted(choices, key=lambda choice: -choice.value)
-    missing = (None,) * (len(assembly) - reached)
-    is_close = len(best) > 1 and best[0].value - best[1].value < _CLOSE
-    return Order((*best[0].intervals, *missing), (*best[1].intervals, *missing) if is_close else None)
+    best = max(choices, key=lambda each: each.value)
+    return (*best.intervals, *[None] * (len(assembly) - reached))
 
 
-def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[float]) -> Order:
+def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[float]) -> Chosen:
     """Return the intervals that contain the stated times, one for each operation.
 
     Raises:
@@ -132,7 +121,7 @@ def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[fl
             f"--operation-ends: '{operation.main}' of operation {k + 1} does not rest at {t:g} s; it rests {rests}.",
         )
         chosen.append(found[0])
-    return Order(tuple(chosen), None)
+    return tuple(chosen)
 
 
 def describe_moves(intervals: RestIntervals) -> str:
@@ -183,28 +172,15 @@ def _lengthen(
     )
     for interval in known[first:] if k not in unseen else ():
         ended = _ended(choice.intervals)
-        if interval.begins > ended and time_taken(intervals, choice.intervals, interval) + _OVERLAP_S >= ended:
+        # A part that was hidden may have been put down and taken again meanwhile.
+        taken = ended if interval.rests[0].hidden else time_taken(intervals, choice.intervals, interval)
+        if interval.begins > ended and taken + _OVERLAP_S >= ended:
             chosen = (*choice.intervals, interval)
             unexplained = _count_unexplained(choice.intervals, _ended(chosen), assembly, intervals)
             yield _Choice(choice.worth + worth(k, interval), choice.unexplained + unexplained, chosen)
     is_lost = known[-1].ends < max(each[-1].ends for each in intervals.values()) - _LOST_S
     if k in unseen or is_lost or any(each.rests[0].hidden for each in known):
         yield _Choice(choice.worth - _SKIPPED * (k not in unseen), choice.unexplained, (*choice.intervals, None))
-
-
-def _keep_best(choices: Sequence[_Choice]) -> list[_Choice]:
-    """Return the two best choices with each last interval, the best first."""
-    kept: list[_Choice] = []
-    for choice in sorted(choices, key=lambda choice: -choice.value):
-        if sum(other.intervals[-1] is choice.intervals[-1] for other in kept) < 2:
-            kept.append(choice)
-    return kept
-
-
-def _count_rest(choice: _Choice, assembly: Assembly, intervals: RestIntervals) -> _Choice:
-    """Return a choice that counts what came to rest after the last operation."""
-    more = _count_unexplained(choice.intervals, np.inf, assembly, intervals)
-    return choice._replace(unexplained=choice.unexplained + more)
 
 
 def _count_unexplained(chosen: Chosen, until: float, assembly: Assembly, intervals: RestIntervals) -> int:
@@ -230,6 +206,11 @@ def _ended(chosen: Chosen) -> float:
 
 def _explain_order(assembly: Assembly, intervals: RestIntervals, k: int) -> NoMatchingOrder:
     """Return an error that names the operation for which no interval is left."""
+    if all(len(known) == 1 for known in intervals.values()):
+        return NoMatchingOrder(
+            "no part comes to rest at another place than before, so the log shows no operation; give a log that goes "
+            "on until the part of the first operation has rested for 0.3 s."
+        )
     part = assembly.operations[k].main
     rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[part])
     return NoMatchingOrder(

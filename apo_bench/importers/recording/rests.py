@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.importers.recording.averaging import Mean, average, common_scatter, pool_mean
-from apo_bench.importers.recording.tracks import PoseTrack
+from apo_bench.importers.recording.tracks import PoseTrack, span_of
 
 LEAST_REST_S = 0.3
 """Shortest rest."""
@@ -64,13 +64,13 @@ class Rest:
 
 def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
     """Return the rests of a track in order of time; they are found in thinned-out frames and averaged over all."""
-    stride = _stride(track)
+    stride = max(1, round(1.0 / (span_of(track) * _ENOUGH_HZ)))  # trackers smooth poses at high rates
     t = track.t[::stride]
     T = track.T[::stride]
     if len(t) < _FEWEST:
         return ()
     noise = np.maximum(_noise(T), _LEAST)
-    period_s = max(float(np.median(np.diff(t))), 1e-6)
+    period_s = span_of(PoseTrack(t, T))
     half_window = max(3, round(0.5 * LEAST_REST_S / period_s))
     spans = list[_Span]()
     for span in _still_spans(T, noise, half_window):
@@ -90,29 +90,9 @@ def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
         came = [float(track.t[i]) if i >= 0 else -np.inf for i in left if a - 2 * stride <= i + 1 <= a]
         begins, ends_s = float(track.t[a]), float(track.t[b])
         hidden = bool(np.any((left < a) & (left >= (rests[-1].last if rests else -1))))
-        rests.append(
-            Rest(
-                a,
-                b,
-                begins,
-                ends_s,
-                max(gone, default=ends_s),
-                pool_mean(mean, common),
-                min(came, default=begins),
-                hidden,
-            )
-        )
+        gone_s, came_s = max(gone, default=ends_s), min(came, default=begins)
+        rests.append(Rest(a, b, begins, ends_s, gone_s, pool_mean(mean, common), came_s, hidden))
     return tuple(rests)
-
-
-def _stride(track: PoseTrack) -> int:
-    """Return the step between frames to search, since trackers repeat poses, or smooth them at high rates."""
-    if len(track.t) < 2:
-        return 1
-    changes = np.flatnonzero((np.diff(track.T, axis=0) != 0.0).any(axis=(1, 2)))
-    repeated = float(np.median(np.diff(changes))) if len(changes) > 1 else 1.0
-    rate = 1.0 / max(float(np.median(np.diff(track.t))), 1e-6)
-    return max(1, round(repeated), round(rate / _ENOUGH_HZ))
 
 
 def _noise(T: Array) -> Array:

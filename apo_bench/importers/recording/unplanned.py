@@ -7,9 +7,12 @@ from typing import NamedTuple
 from apo_bench.errors import require
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, find_cameras
-from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_all_intervals
+from apo_bench.importers.recording.rest_intervals import RestInterval, find_all_intervals
 from apo_bench.importers.recording.rests import Rest, group_consecutive
 from apo_bench.importers.recording.tracks import PoseTrack
+
+_Move = tuple[RestInterval, RestInterval]
+"""A motion of a part: the rest intervals before and after."""
 
 
 class ObservedPlacement(NamedTuple):
@@ -21,18 +24,10 @@ class ObservedPlacement(NamedTuple):
 
 
 class UnplannedRecording(NamedTuple):
-    """The camera, rest intervals and operations of a recording without a scenario."""
+    """The camera and the operations of a recording without a scenario."""
 
     camera: CameraPose
-    intervals: RestIntervals
     placements: tuple[ObservedPlacement, ...]
-
-
-class _Move(NamedTuple):
-    """A motion of a part from one rest interval to the next."""
-
-    taken: float  # [s]
-    to: RestInterval
 
 
 def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, file: str) -> UnplannedRecording:
@@ -45,21 +40,20 @@ def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, fil
     # Without a scenario no part starts at a planned place.
     known = {part: T for part, T in camera.known.items() if T is not None}
     found = find_cameras(intervals, CameraFile(camera.conventions, camera.T_world_camera, known, camera.stays), {})[0]
-    moves = [_Move(before.ends, after) for known in intervals.values() for before, after in pairwise(known)]
+    moves = sorted((move for known in intervals.values() for move in pairwise(known)), key=lambda move: move[1].begins)
     require(moves, f"{file}: no part comes to rest at another place than before, so there is no operation.")
-    moves.sort(key=lambda move: move.to.begins)
     groups = group_consecutive(moves, lambda group, move: any(_is_together(move, other) for other in group))
-    return UnplannedRecording(found, intervals, tuple(_place(group) for group in groups))
+    return UnplannedRecording(found, tuple(map(_place, groups)))
 
 
 def _is_together(move: _Move, other: _Move) -> bool:
     """Whether two parts moved together, for more than half of the shorter motion."""
-    shared = min(move.to.begins, other.to.begins) - max(move.taken, other.taken)
-    shorter = min(move.to.begins - move.taken, other.to.begins - other.taken)
-    return move.to.part != other.to.part and shared > 0.5 * shorter
+    (a, b), (c, d) = move, other
+    shared = min(b.begins, d.begins) - max(a.ends, c.ends)
+    return b.part != d.part and shared > 0.5 * min(b.begins - a.ends, d.begins - c.ends)
 
 
 def _place(moves: Sequence[_Move]) -> ObservedPlacement:
     """Return motions that belong together as one operation; the part that was taken first is the main part."""
-    first, *others = sorted(moves, key=lambda move: move.taken)
-    return ObservedPlacement(first.to.part, tuple(move.to.part for move in others), first.to.rests[-1])
+    (_, first), *others = sorted(moves, key=lambda move: move[0].ends)
+    return ObservedPlacement(first.part, tuple(after.part for _, after in others), first.rests[-1])

@@ -1,6 +1,7 @@
 """The simulated robot: its motions along lines, its force sensors, its gripper and its errors."""
 
 from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, servo, zero, zero_again
+from apo_bench.simulation.robot.force_steps import ForceSteps
 from apo_bench.simulation.robot.forces import Guard, LowPass
 from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
@@ -34,6 +35,7 @@ __all__ = (
     "READING_S",
     "TINY_S",
     "ExecutionAborted",
+    "ForceSteps",
     "GraspSlipMonitor",
     "Guard",
     "LowPass",

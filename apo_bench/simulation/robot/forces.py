@@ -49,14 +49,14 @@ class LowPass:
             forces: Mean force during each step, (k, 3), [N].
             step_s: Length of a step, at most the time constant.
         """
-        decay, weights = _step_weights(len(forces), step_s / self._time_constant_s)
+        decay, weights = low_pass_weights(len(forces), step_s / self._time_constant_s)
         filtered = decay * self.force + weights @ forces
         self.force = filtered[-1].tolist()
         return np.asarray(filtered)
 
 
 @lru_cache(maxsize=256)
-def _step_weights(k: int, part: float) -> tuple[Array, Array]:
+def low_pass_weights(k: int, part: float) -> tuple[Array, Array]:
     """Return the weights of a low pass over k steps: of its state before, (k, 1), and of the forces, (k, k).
 
     Args:
@@ -126,6 +126,14 @@ class ForceSensors:
         """Return the net contact force on the held parts, except that of the gripper, (3,), world, [N]."""
         net: list[float] = np.dot(self._net_of_sensors, self.sensors).tolist()
         return net
+
+    def net_along(self, axes: Array) -> Array:
+        """Return the matrix from `sensors` to the net force of `net` along other axes, (3, sensors), [N].
+
+        Args:
+            axes: (3, 3), columns, world.
+        """
+        return np.ascontiguousarray(axes.T @ self._net_of_sensors)
 
     def external_n(self) -> float:
         """Return the contact force on the held parts, or on the arm with an empty hand, [N]."""

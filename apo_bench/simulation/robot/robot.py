@@ -4,8 +4,8 @@ Every physics step of a replay is taken in one of two methods. `_tick` takes tho
 `servo_step` takes those of motions that depend on the force after each step.
 
 The robot knows its commands, its joint and finger positions and the force on the held part; no command depends on the
-true pose of a part. Only the simulation reads or sets these: `_look` and `slip` shift parts in the hand, `in_hand`
-records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
+true pose of a part. Only the simulation reads or sets these: `check_state` and `slip` shift parts in the hand,
+`in_hand` records this, and `follow` and `fingers` skip steps while nothing is near (fidelity `near-contact`).
 
 The file is long because all these methods change one state: the command, the simulation and its time.
 """
@@ -122,8 +122,11 @@ class Robot:
         damping = model.dof_damping[self._dof] - model.actuator_biasprm[self._drives, 2]
         self._lead = damping / model.actuator_gainprm[self._drives, 0]
         self._stick = model.dof_frictionloss[self._dof] / model.actuator_gainprm[self._drives, 0]
+        self._sticks = bool(self._stick.any())
+        self._sags = bool(self._sag.any())
         self.step_s = float(model.opt.timestep)
-        self._steps_of_tick = max(1, round(TICK_S / self.step_s))
+        self.steps_of_tick = max(1, round(TICK_S / self.step_s))
+        """Number of physics steps after which the state is checked."""
         # Commanded joint angles, and the tip pose to which they lead without errors.
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
@@ -131,6 +134,7 @@ class Robot:
         self.data: Any = make_initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self._true(self.q[None])[0]
         self._fingers.put(self.data, self.arm.opening_m)
+        self._controls: Array = self.data.ctrl  # a view, since the attribute takes a microsecond
         self.data.ctrl[:] = 0.0
         mujoco.mj_forward(model, self.data)
         self.data.ctrl[self._drives] = self._true(self.q[None])[0]
@@ -210,13 +214,21 @@ class Robot:
         Returns:
             The contact force on the held part, (3,), world, [N].
         """
-        to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
-        self.data.ctrl[self._drives] = self._true(to[None])[0] + self._droop
+        self.command(q, velocity)
         mujoco.mj_step(self.model, self.data)
         force = self.forces.take_step(self.step_s)
-        if passed % self._steps_of_tick == 0:
-            self._look()
+        if passed % self.steps_of_tick == 0:
+            self.check_state()
         return force
+
+    def command(self, q: Array, velocity: Array | None = None) -> None:
+        """Command joint angles to the servos; arguments as for `servo_step`."""
+        to = q
+        if velocity is not None and self._sticks:
+            to = feedforward_command(q, velocity, self._lead, self._stick)
+        elif velocity is not None:
+            to = q + self._lead * velocity
+        self._controls[self._drives] = (self._true(to[None])[0] if self._sags else to + self._off) + self._droop
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still for some time.
@@ -226,12 +238,12 @@ class Robot:
         """
         self.data.ctrl[:] = self._commands(self.q[None])[0]
         steps = round(seconds / self.step_s)
-        for done in range(0, steps, self._steps_of_tick):
-            n = min(self._steps_of_tick, steps - done)
+        for done in range(0, steps, self.steps_of_tick):
+            n = min(self.steps_of_tick, steps - done)
             with use_timestep(self.model, self.step_s / parts):
                 self._tick(parts * n)
-            if n == self._steps_of_tick:
-                self._look()
+            if n == self.steps_of_tick:
+                self.check_state()
 
     def stand(self, most_s: float = 0.1) -> None:
         """Stand still until the joints and the fingers rest, or for `most_s`."""
@@ -335,6 +347,7 @@ class Robot:
         """Replace the joint errors, (joints,), [rad]: true minus measured angles, and the sag, after calibration."""
         self._off = off
         self._sag = sag
+        self._sags = bool(sag.any())
         if off.any() or sag.any():
             self.fidelity = "full"
 
@@ -394,11 +407,11 @@ class Robot:
             How many steps were taken.
         """
         commands = self._commands(targets)
-        for done in range(0, len(commands), self._steps_of_tick):
-            tick = commands[done : done + self._steps_of_tick]
+        for done in range(0, len(commands), self.steps_of_tick):
+            tick = commands[done : done + self.steps_of_tick]
             stopped = self._tick(len(tick), tick, guard)
-            if stopped or len(tick) == self._steps_of_tick:
-                self._look()
+            if stopped or len(tick) == self.steps_of_tick:
+                self.check_state()
             if stopped:
                 return done + stopped
         return len(commands)
@@ -407,7 +420,7 @@ class Robot:
         """Take n physics steps, without checking the state between them.
 
         The forces on held parts, and those of a wrist sensor that is on, are read at each step. The others are needed
-        by `_look` only, so MuJoCo computes them for the last step only.
+        by `check_state` only, so MuJoCo computes them for the last step only.
 
         Args:
             commands: Of all actuators before each step, (n, controls); None: they stay as they are.
@@ -443,7 +456,7 @@ class Robot:
         self.forces.take(rows[:steps], step_s)
         return steps if stopped else 0
 
-    def _look(self) -> None:
+    def check_state(self) -> None:
         """Check the state once a tick: abort if the simulation diverged or the arm collided; then call the hook.
 
         Between these, the creep of carried parts is removed.

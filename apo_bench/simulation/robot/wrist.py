@@ -18,7 +18,7 @@ from apo_bench.records import FtNoise
 from apo_bench.scenario.parts import read_part
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import body_frame
-from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.forces import Guard, low_pass_weights
 from apo_bench.simulation.robot.gripper import open_hand
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene
 
@@ -169,7 +169,11 @@ class WristSensor:
 
     def take(self, step_s: float) -> bool:
         """Add the sensor data of the last physics step, which lasted `step_s`; return whether a reading is complete."""
-        self._sum += step_s * self._raw
+        return self._add(self._raw, step_s)
+
+    def _add(self, raw: Array, step_s: float) -> bool:
+        """Add the sensor data of a physics step, (6,); return whether a reading is complete."""
+        self._sum += step_s * raw
         self._summed_s += step_s
         self._clock_s += step_s
         if self._clock_s < READING_S - _ROUNDING_S:
@@ -183,6 +187,22 @@ class WristSensor:
         if self._readings is not None:
             self._readings.append(reading)
         return True
+
+    @property
+    def raw(self) -> Array:
+        """Force and torque after the last physics step, (6,), in the frame of the sensor: a view."""
+        return self._raw
+
+    def take_rows(self, rows: Array, step_s: float) -> None:
+        """Add the sensor data of several physics steps, (k, 6), which lasted `step_s` each."""
+        if self._readings is not None or self._clock_s or abs(step_s - READING_S) > _ROUNDING_S:
+            for row in rows:
+                self._add(row, step_s)
+            return
+        readings = rows + self._offset + self._drift() + self._sigma * self._rng.standard_normal(rows.shape)
+        before = readings[0] if self._filtered is None else self._filtered
+        decay, weights = low_pass_weights(len(rows), self._part)
+        self._filtered = decay[-1] * before + weights[-1] @ readings
 
     def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
         """Return a copy, with the same offset and tare but no drift, for another simulation of its robot.

@@ -6,7 +6,7 @@ wrist. No command depends on the true pose of a part.
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import NamedTuple, final
 
 import numpy as np
@@ -23,8 +23,9 @@ from apo_bench.simulation.execution import (
     restore_state,
     wait_for_rest,
 )
+from apo_bench.simulation.frames import cross, rotation_vector
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot import LowPass, Robot, translate
+from apo_bench.simulation.robot import ForceSteps, LowPass, Robot, translate
 from apo_bench.simulation.scene import (
     Scene,
     allow_sleep,
@@ -104,11 +105,10 @@ class TipControl:
         self._left = 0.0 if start.second is None else float(t.into.left or 0.0)  # end of the line to the goal, [m]
         self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
         self._filtered = LowPass(_AVERAGED_S)
-        self._force = robot.forces.net()
+        self._steps = ForceSteps(robot, self._wrist, self._R)
         self._speed = 0.0  # of the approach, [m/s]
         self._stopped: float | None = None  # distance to the goal at the first contact, [m]
         self._pushed = 0  # number of actions in a row with a push back
-        self._passed = 0  # number of physics steps
         self._turn: Array = np.zeros(3)  # sum of the turns by actions
         self._at: Array = self._off(robot.T)[:3]  # position of the front by linear kinematics, off the line's end
         self.begins = -float(self._at[2])
@@ -183,7 +183,7 @@ class TipControl:
         for goal in goals:
             direction = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.direction
             far = pose.apply(T, front)[0] - pose.apply(goal @ self._T_goal_end, front)[0]  # offset of the front
-            turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
+            turn = rotation_vector(T[:3, :3] @ goal[:3, :3].T)
             across = (far - (far @ direction) * direction) @ self._R
             found.append([*across[:2], far @ direction, *turn @ self._R])
         return np.asarray(np.mean(found, axis=0))
@@ -213,7 +213,7 @@ class TipControl:
     @property
     def contact_force(self) -> Array:
         """The true contact force on the held parts, (3,), in the frame of the insertion axis, [N]; for observers."""
-        return np.asarray(np.array(self._force) @ self._R)
+        return np.array(self._steps.force)
 
     @property
     def touches(self) -> bool:
@@ -242,55 +242,53 @@ class TipControl:
         robot = self.robot
         dt = robot.step_s
         steps = round(PERIOD_S / dt)
-        direction = self.start.transfer.into.direction
         T = robot.T
         off = self._off(T)
-        # Limits of the front's position, in the frame of the axis.
+        # Limits of the front's position, in the frame of the axis; so are all vectors below, as plain numbers.
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
-        # Velocity of the front by the action, world; it also corrects the linearisation error of the last period.
-        wanted = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
-        from_there = off[:3]
-        moved = np.zeros(3)
+        # Velocity of the front by the action; it also corrects the linearisation error of the last period.
+        x, y, z = ((np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S).tolist()
+        from_there = off[:3].tolist()
+        moved = [0.0, 0.0, 0.0]
         self._turn = np.clip(self._turn + turn, -_TURN_RAD, _TURN_RAD)
         # The tip turns about the front: v_tip = v_front + w x (tip - front), all in the frame of the tip.
         R = T[:3, :3]
         w = R.T @ self._R @ (self._turn - off[3:]) / PERIOD_S
-        twist = np.concatenate([np.cross(w, -self._front), w])
+        twist = np.concatenate([cross(w, -self._front), w])
         back = robot.scene.kinematics.inverse_jacobian(robot.q)
         turning = back @ twist
-        shifting = back[:, :3] @ R.T
+        shifting = np.ascontiguousarray(back[:, :3] @ R.T @ self._R)
         q = robot.q
-        left = self._left - float(off[2])  # distance to the goal, [m]
-        for _ in range(steps):
-            f = np.array(self._filtered(self._force, dt))
-            push = -float(f @ direction)
-            advance = wanted
-            yields = _YIELD * f
-            if self.nominal:
-                side = math.sqrt(max(float(f @ f) - push * push, 0.0))
-                # Fast: unfiltered force, since the filter would react too late.
-                sudden = -float(np.dot(self._force, direction)) if self._speed > _FAST_M_S else push
-                if self._stopped is None and max(sudden, side) > self._guard:
-                    # First contact: continue from the measured joint angles, which takes the pressure away.
-                    q = robot.encoders()
-                    from_there = self._off(robot.scene.kinematics.forward(q))[:3]
-                    moved = np.zeros(3)
-                    self._speed, self._stopped = 0.0, left
-                advance = wanted + self._ahead(left, push, side, dt) * direction
-                yields = yields + _YIELD * push * direction  # lateral only: `_ahead` controls the force along the axis
-            moved = moved + dt * (advance + yields)
-            left = self._left - float(from_there[2] + moved @ direction)
-            leads = turning + shifting @ advance  # joint velocities for the feedforward
-            q = q + dt * (leads + shifting @ yields)
-            self._passed += 1
-            self._force = robot.servo_step(q, self._passed, leads)
-            self._wrist.take(dt)
-        self._at = from_there + moved @ self._R  # rows times R: from the world to the frame of the axis
+        left = self._left - from_there[2]  # distance to the goal, [m]
+        force = self._steps.force
+        with closing(self._steps.ticks(steps)) as ticks:
+            for count in ticks:
+                for _ in range(count):
+                    fx, fy, fz = self._filtered(force, dt)
+                    ahead, along = 0.0, _YIELD * fz
+                    if self.nominal:
+                        side = math.hypot(fx, fy)
+                        # Fast: unfiltered force, since the filter would react too late.
+                        sudden = -(force[2] if self._speed > _FAST_M_S else fz)
+                        if self._stopped is None and max(sudden, side) > self._guard:
+                            # First contact: continue from the measured joint angles, which takes the pressure away.
+                            q = robot.encoders()
+                            from_there = self._off(robot.scene.kinematics.forward(q))[:3].tolist()
+                            moved = [0.0, 0.0, 0.0]
+                            self._speed, self._stopped = 0.0, left
+                        # Yields are lateral only: `_ahead` controls the force along the axis.
+                        ahead, along = self._ahead(left, -fz, side, dt), 0.0
+                    advance, yields = (x, y, z + ahead), (_YIELD * fx, _YIELD * fy, along)
+                    moved = [m + dt * (a + b) for m, a, b in zip(moved, advance, yields, strict=True)]
+                    left = self._left - (from_there[2] + moved[2])
+                    leads = turning + shifting.dot(advance)  # joint velocities for the feedforward
+                    q = q + dt * (leads + shifting.dot(yields))
+                    force = self._steps.step(q, leads)
+        self._at = np.array(from_there) + moved
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
-        push = -float(np.dot(self._filtered.force, direction))
-        self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
+        self._pushed = self._pushed + 1 if -self._filtered.force[2] > self.start.transfer.slide_n / 2 else 0
         here = left - self._pace.end  # distance to the end of the motion
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
@@ -336,7 +334,7 @@ class TipControl:
         The first three numbers are the shift of the front of the part, the others a rotation vector.
         """
         shift = pose.apply(T, self._front[None])[0] - pose.apply(self._end, self._front[None])[0]
-        turn = pose.log(pose.rigid(T[:3, :3] @ self._end[:3, :3].T, np.zeros(3)))[3:]
+        turn = rotation_vector(T[:3, :3] @ self._end[:3, :3].T)
         return np.concatenate([shift @ self._R, turn @ self._R])
 
     def _read(self) -> TipReading:

@@ -106,7 +106,7 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
     ("words", "complaint"),
     [
         (["--out", "."], "is there already and not an empty folder"),
-        (["--out", "new", "--record", "insertions"], "give the format lerobot, whose tables are Parquet"),
+        (["--out", "new", "--episode-type", "insertions"], "give the format lerobot, whose tables are Parquet"),
     ],
 )
 def test_what_is_wrong_is_said(

@@ -104,6 +104,39 @@ def test_minari_finds_what_was_seen_around_every_action(minari: dict[str, Path],
     assert (spec.id, spec.kwargs["scenario"]) == ("APOInsert-v0", "block_on_block")
 
 
+def test_frames_of_insertions_have_joints_tip_command_and_phase(
+    minari: dict[str, Path], lerobot: dict[str, Path]
+) -> None:
+    h5py = pytest.importorskip("h5py")
+    frames = columns(parquet.read_table(lerobot["insertions"] / "data"))
+    first = frames["episode_index"] == 0
+    for name in ("tip", "tip_command"):
+        np.testing.assert_allclose(np.linalg.norm(frames[f"robot.{name}"][:, 3:], axis=1), 1.0, atol=1e-6)
+    assert frames["robot.joints"].shape[1] == 7  # six joints, and the opening
+    apart = np.linalg.norm(frames["robot.tip"][:, :3] - frames["robot.tip_command"][:, :3], axis=1)
+    assert apart.max() < 0.005
+    phases = frames["robot.phase"][first]
+    assert phases[0] == 0.0
+    assert (np.diff(phases) >= 0.0).all()
+    with h5py.File(minari["insertions"] / "data" / "main_data.hdf5") as file:
+        infos = file["episode_0/infos"]
+        np.testing.assert_array_equal(infos["tip_command"][:-1], frames["robot.tip_command"][first])
+        assert infos["phase"][-1] == 4.0
+
+
+def test_the_card_of_insertions_states_every_argument_the_split_and_the_citation(lerobot: dict[str, Path]) -> None:
+    card = (lerobot["insertions"] / "README.md").read_text()
+    for line in (
+        "| `shift_mm` | `1.0` |",
+        "| `turn_deg` | `0.5` |",
+        "| `horizon` | `400` |",
+        "| `corrector` | `'contact'` |",
+    ):
+        assert line in card
+    assert "the split `train`" in card
+    assert "@software{apo_bench," in card
+
+
 @pytest.mark.parametrize(("form", "policy"), [("lerobot", "expert"), ("minari", None)])
 def test_every_episode_is_the_same_bit_for_bit_when_it_is_made_again(
     form: str, policy: str | None, tmp_path: Path

@@ -10,20 +10,18 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import array_shapes, arrays
 from msgspec.structs import replace
 
 from apo_bench import InputError, TrialConfig, load_scenario
 from apo_bench.benchmark.datasets.images import make as made
-from apo_bench.benchmark.datasets.images.estimate import estimate_poses
-from apo_bench.benchmark.datasets.images.models import ImageObject, describe_model, make_model, measure_diameter
-from apo_bench.benchmark.datasets.images.scene import add_depth_noise, decode_mask, encode_mask
+from apo_bench.benchmark.datasets.images.estimate import estimate_images
+from apo_bench.benchmark.datasets.images.models import ImageObject, make_info_entry, make_model, measure_diameter
+from apo_bench.benchmark.datasets.images.scene import add_depth_noise
 from apo_bench.benchmark.datasets.images.views import draw_views
 from apo_bench.formats.bop import read_results
-from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_description
+from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_image_description
 from apo_bench.formats.bop_models import read_symmetries
+from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import collect_corners, pose, shrink_pieces
 from apo_bench.io import convert_typed
 from apo_bench.records import SecretSeed
@@ -79,7 +77,7 @@ def test_depth_points_lie_on_the_models_at_the_true_poses(images: Path) -> None:
 
 def test_published_cameras_give_world_poses(images: Path) -> None:
     """Both cameras agree on where the parts are, and the end is what the demonstration left."""
-    description = read_description(images)
+    description = read_image_description(images)
     cameras = read_cameras(images / "test" / "000001")
     world = {
         (image, number): cameras[image].T_world_camera @ T @ pose.inverse(description.offset(number))
@@ -123,7 +121,7 @@ def test_models_are_centred_and_symmetries_leave_them_where_they_are(name: str, 
             continue
         each = ImageObject("file", 0.25, (0.5, 0.25, 1.0), solid)
         mesh = make_model(each)
-        entry = describe_model(each, mesh.vertices)
+        entry = make_info_entry(each, mesh.vertices)
         low = np.array([entry[f"min_{axis}"] for axis in "xyz"])
         size = np.array([entry[f"size_{axis}"] for axis in "xyz"])
         assert low == pytest.approx(-size / 2, abs=1e-9)
@@ -158,7 +156,7 @@ def test_secret_trials_show_no_poses(tmp_path: Path) -> None:
     images = make(tmp_path / "set", "block_on_block", secret_seed=secret)
     kept = {path.name for path in (images / "test" / "000001").iterdir()}
     assert kept == {"depth", "scene_camera.json", "scene_detections.json"}
-    assert read_description(images).secret_seed == secret.hash
+    assert read_image_description(images).secret_seed == secret.hash
     assert secret.secret.hex() not in "".join(path.read_text() for path in images.rglob("*.json"))
     assert read(images / "detections.json")
 
@@ -227,19 +225,11 @@ def test_depth_noise_grows_with_the_squared_depth() -> None:
     assert np.array_equal(exact, [[1.0, 0.0]])
 
 
-@given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=12), elements=st.booleans()))
-def test_masks_come_back(mask: Any) -> None:
-    encoded = encode_mask(mask)
-    assert np.array_equal(decode_mask(encoded), mask)
-    assert sum(encoded["counts"]) == mask.size
-    assert all(encoded["counts"][1:])
-
-
 def test_the_estimator_finds_parts_in_exact_depth(tmp_path: Path) -> None:
     """Within a millimetre of a pose that looks the same, for most parts, from depth of 1.5 mm wide pixels."""
     pytest.importorskip("small_gicp", reason="small_gicp, of the extra range, is not installed")
     images = make(tmp_path / "set", config=replace(SMALL, width=640, height=480))
-    made = estimate_poses(images, images / "icp.csv")
+    made = estimate_images(images, images / "icp.csv")
     rows = read_results(images / "icp.csv")
     truth = dict(list_truth(images))
     symmetries = read_symmetries(images / "models" / "models_info.json")

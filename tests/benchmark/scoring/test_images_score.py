@@ -12,7 +12,7 @@ from apo_bench import InputError, TrialConfig, run_trial
 from apo_bench.benchmark.scoring.images import score_poses
 from apo_bench.cli.app import main
 from apo_bench.formats.bop import EstimatedPose, write_results
-from apo_bench.formats.bop_images import read_cameras, read_description
+from apo_bench.formats.bop_images import read_cameras, read_image_description
 from apo_bench.geometry import Array, pose
 from apo_bench.trial.run import noise_of
 from apo_bench.trial.trial_stages import demonstration_of, observe_demonstration, scene_of
@@ -51,7 +51,7 @@ def test_noise_written_as_results_gives_the_trial_of_that_noise(images: Path) ->
     scene = scene_of(config)
     simulated = demonstration_of(config, scene)
     seen = observe_demonstration(simulated, noise_of(config, scene, simulated), config.seed)
-    description = read_description(images)
+    description = read_image_description(images)
     entry = description.scenes["2"]
     cameras = read_cameras(images / "test" / "000002")
     rows = []

@@ -19,7 +19,7 @@ from apo_bench.benchmark.scoring.pose_errors import (
     measure_recall,
 )
 from apo_bench.formats.bop import EstimatedPose, read_results, write_results
-from apo_bench.formats.bop_images import read_description
+from apo_bench.formats.bop_images import read_image_description
 from apo_bench.geometry import Array, pose
 from tests.image_sets import SMALL, list_truth, make, write_truth
 
@@ -29,7 +29,7 @@ SHIFT = st.floats(-20.0, 20.0)
 
 
 def model(*symmetries: Array) -> EvaluatedModel:
-    return EvaluatedModel(CUBE, 40.0, np.array([np.eye(4), *symmetries]))
+    return EvaluatedModel(CUBE, CUBE, 40.0, np.array([np.eye(4), *symmetries]))
 
 
 def errors_of(estimate: Array, each: EvaluatedModel) -> Array:
@@ -69,7 +69,7 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def recall(images: Path, path: Path) -> PoseRecall:
-    found = measure_recall(images, read_description(images), read_results(path))
+    found = measure_recall(images, read_image_description(images), read_results(path))
     return found["stick_in_tower"]
 
 
@@ -100,6 +100,6 @@ def test_pixels_count_relative_to_the_width_of_the_image(images: Path) -> None:
 
 
 def test_secret_poses_have_no_recall(images: Path) -> None:
-    description = replace(read_description(images), secret_seed="0" * 16)
+    description = replace(read_image_description(images), secret_seed="0" * 16)
     assert measure_recall(images, description, read_results(write_truth(images))) == {}
     assert list(list_truth(images))

@@ -113,6 +113,18 @@ def test_matrices_in_json_are_found_by_their_names(key: str, tmp_path: Path) -> 
     np.testing.assert_allclose(read_log(tmp_path / "log.json", Conventions()).tracks["a"].T, [T] * 3, atol=1e-12)
 
 
+def test_matrices_in_rows_and_the_truth_of_a_scene_are_logs(tmp_path: Path) -> None:
+    """KITTI, with one file for each object, and `scene_gt.json` of BOP; both count images."""
+    T = np.array([pose.at((0.1 + 0.01 * k, 0.2, 0.9), (10.0, 20.0 + k, 30.0)) for k in range(5)])
+    np.savetxt(tmp_path / "a.txt", T[:, :3].reshape(-1, 12))
+    entry = [{"obj_id": 7, "cam_R_m2c": M[:3, :3].ravel().tolist(), "cam_t_m2c": (1e3 * M[:3, 3]).tolist()} for M in T]
+    (tmp_path / "scene_gt.json").write_text(json.dumps({str(k): [each] for k, each in enumerate(entry)}))
+    for file, name in (("a.txt", "a"), ("scene_gt.json", "7")):
+        track = read_log(tmp_path / file, Conventions(rate_hz=10.0)).tracks[name]
+        np.testing.assert_allclose(track.T, T, atol=1e-9)
+        np.testing.assert_allclose(track.t, 0.1 * np.arange(5), atol=1e-12)
+
+
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("apo_bench.importers.recording.log_tables.LARGEST_LOG_BYTES", 1000)
     (tmp_path / "log.csv").write_text(HEAD + "".join(f"{i},a,0,0,900,1,0,0,0\n" for i in range(100)), encoding="utf-8")

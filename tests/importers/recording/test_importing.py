@@ -117,6 +117,38 @@ def test_a_part_that_is_hidden_while_others_are_placed_is_where_it_is_seen_again
     assert all(np.linalg.norm(twist[:3]) < 1e-3 for each in later.operations for twist in each.adjusted.values())
 
 
+def test_a_part_that_is_placed_while_it_is_hidden_is_where_it_is_seen_again() -> None:
+    """The first castle has no frames until the second one stands on the table, and the tower needs it there."""
+    tracks = seen(NAME, 0.5)
+    whole = imported(tracks)
+    recording = imported({**tracks, "castle1": without(tracks["castle1"], -1.0, 3.9)})
+    off = pose.log(pose.inverse(whole.observation.poses) @ recording.observation.poses)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert recording.arrangement.start_source["castle1"] == "scenario"
+    assert all(not each.adjusted for each in recording.operations)
+
+
+def test_a_part_that_is_never_seen_at_a_place_is_not_observed_there() -> None:
+    """The fixture A is hidden in a hand, put down, taken again, and seen in the hand."""
+    name = "fixture_alignment"
+    tracks = seen(name, 0.5)
+    recording = imported({**tracks, "B": without(tracks["B"], 1.5, 4.7)}, name=name)
+    assert recording.observation.observed.tolist() == [False, True, True]
+    assert any("operation 1 (B) was not observed" in doubt for doubt in recording.doubts)
+
+
+def test_a_log_may_end_before_the_last_operations_and_not_leave_out_others() -> None:
+    tracks = {part: PoseTrack(t[t < 2.6], T[t < 2.6]) for part, (t, T) in seen(NAME, 0.5).items()}
+    recording = imported(tracks)
+    assert recording.observation.observed.tolist() == [True, False, False]
+    assert any("operation 3 (stick) was not observed" in doubt for doubt in recording.doubts)
+    with pytest.raises(InputError, match="the log shows no operation"):
+        imported({part: PoseTrack(t[t < 1.7], T[t < 1.7]) for part, (t, T) in tracks.items()})
+    tracks = seen(NAME, 0.5)
+    with pytest.raises(InputError, match="have another order"):
+        imported({**tracks, "castle1": tracks["castle2"], "castle2": tracks["castle1"]})
+
+
 def test_a_round_part_that_spins_rests_and_may_be_hidden_while_another_is_placed() -> None:
     name = "peg_in_hole"
     tracks = seen(name, 0.5)

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.benchmark.datasets.images.make import JOINED_DETECTIONS
-from apo_bench.benchmark.datasets.images.scene import decode_mask
 from apo_bench.errors import require
 from apo_bench.formats.bop import EstimatedPose, write_results
-from apo_bench.formats.bop_images import PublishedCamera, SceneEntry, read_cameras, read_description
+from apo_bench.formats.bop_images import PublishedCamera, SceneEntry, read_cameras, read_image_description
+from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import Array, find_symmetries, pose, shrink_pieces
 from apo_bench.io import group_by, read_plain
 from apo_bench.perception.depth_camera.model_localisation import Appearance, Model, locate_model
@@ -36,7 +36,7 @@ class _SceneModels(NamedTuple):
     cast: ModelRays
 
 
-def estimate_poses(images: Path, out: Path) -> int:
+def estimate_images(images: Path, out: Path) -> int:
     """Estimate the pose of each detection in a data set of images, and write a results file of the BOP format.
 
     Args:
@@ -50,7 +50,7 @@ def estimate_poses(images: Path, out: Path) -> int:
         InputError: The folder is no such data set, or small_gicp is not installed.
     """
     load_small_gicp()
-    description = read_description(images)
+    description = read_image_description(images)
     detections = read_plain(images / JOINED_DETECTIONS, "detections", syntax="json", limit=_LARGEST_BYTES)
     require(detections, f"{images / JOINED_DETECTIONS}: there is no detection; make images of more trials.")
     models: dict[tuple[str, float], _SceneModels] = {}

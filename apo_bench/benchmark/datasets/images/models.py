@@ -65,7 +65,7 @@ def measure_diameter(points: Array) -> float:
     return float(pdist(points[ConvexHull(points).vertices]).max())
 
 
-def describe_model(each: ImageObject, vertices: Array) -> dict[str, Any]:
+def make_info_entry(each: ImageObject, vertices: Array) -> dict[str, Any]:
     """The entry of `models_info.json`: diameter, bounding box and symmetries, in mm and the frame of the model.
 
     Args:
@@ -92,7 +92,7 @@ def write_models(objects: Mapping[int, ImageObject], out: Path) -> None:
         (out / folder).mkdir(parents=True, exist_ok=True)
     for number, each in objects.items():
         mesh = make_model(each)
-        described[str(number)] = describe_model(each, mesh.vertices)
+        described[str(number)] = make_info_entry(each, mesh.vertices)
         fine = mesh.subdivide_to_size(_FINEST * described[str(number)]["diameter"])
         fine.merge_vertices(merge_norm=True)  # so that each counts once in a mean
         for folder, form in zip(_FOLDERS, (mesh, fine), strict=True):

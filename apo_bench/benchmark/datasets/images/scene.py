@@ -2,39 +2,31 @@
 
 import json
 import zlib
-from collections.abc import Iterator, Mapping
-from itertools import groupby
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Demonstration, Poses
-from apo_bench.benchmark.datasets.images.views import ViewPair, draw_views, number_images
-from apo_bench.formats.bop_images import CAMERAS, ImageConfig, ImageDescription, SceneEntry
+from apo_bench.benchmark.datasets.images.views import draw_views, number_images
+from apo_bench.formats.bop_images import CAMERAS, ImageDescription
+from apo_bench.formats.coco import encode_mask, make_coco
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_file
-from apo_bench.perception.depth_camera.range_finder import BIAS
+from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
 from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photographer, Silhouette, find_box
 
 DETECTIONS = "scene_detections.json"
 """The detections of one scene, written last, so that a scene with this file is complete."""
+TRUTH, VISIBILITY = "scene_gt.json", "scene_gt_info.json"
 DEPTH_SCALE = 0.1
 """[mm] of one step in a depth image."""
 _FARTHEST_MM = 6500.0  # depth that 16 bits hold
 _DROPOUTS = 0.01  # fraction of pixels without a reading, if there is noise
 _LEAST_VISIBLE = 0.1
 """A part of which a smaller fraction is visible is no target, as in the BOP benchmark."""
-
-
-class SceneFiles(NamedTuple):
-    """The JSON files of a scene while its images are taken, by the number of the image."""
-
-    camera: dict[str, Any]
-    gt: dict[str, Any]
-    gt_info: dict[str, Any]
-    detections: list[dict[str, Any]]
 
 
 def list_moments(demonstration: Demonstration) -> Iterator[Poses]:
@@ -61,7 +53,7 @@ def write_scene(
         rng: Source of the cameras, their errors, and the noise of the depth images.
         out: Folder of the scene, made here.
     """
-    scene = description.scenes[str(number)]
+    parts = description.scenes[str(number)].parts
     config = description.options
     is_secret = description.secret_seed is not None
     for folder in ("depth", *["rgb"] * (not config.no_rgb), *["mask", "mask_visib"] * (not is_secret)):
@@ -70,21 +62,28 @@ def write_scene(
     views = draw_views(config, rng)
     if config.randomise:
         photographer.vary(rng)
-    files = SceneFiles({}, {}, {}, [])
+    files: dict[str, dict[int, Any]] = {CAMERAS: {}, TRUTH: {}, VISIBILITY: {}}
+    detections: list[dict[str, Any]] = []
     for image, operation, camera in number_images(len(moments), config.cameras):
-        poses = moments[operation - 1]
-        photograph = photographer.take(views[camera].true, poses)
+        poses, view = moments[operation - 1], views[camera]
+        photograph = photographer.take(view.true, poses)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
-        _describe_image(photograph, depth, views[camera], poses, (number, image), description, files)
-    written: dict[str, Any] = {CAMERAS: files.camera}
+        models = [(k, poses[part] @ description.offset(k)) for part, k in parts.items()]
+        facts = [_measure_visibility(photograph.visible[part], photograph.whole[part], depth) for part in parts]
+        files[CAMERAS][image] = _describe_camera(view.published)
+        files[TRUTH][image] = [_describe_pose(k, pose.inverse(view.true.T_world_view) @ T) for k, T in models]
+        files[VISIBILITY][image] = facts
+        seen = [
+            _make_detection((number, image, k), photograph.visible[part])
+            for (part, k), fact in zip(parts.items(), facts, strict=True)
+            if fact["visib_fract"] >= _LEAST_VISIBLE
+        ]
+        detections += sorted(seen, key=lambda each: each["bbox"])  # an order that does not tell equal parts apart
+    written: dict[str, Any] = {CAMERAS: files[CAMERAS]} if is_secret else dict(files)
     if not is_secret:
-        written |= {
-            "scene_gt.json": files.gt,
-            "scene_gt_info.json": files.gt_info,
-            "scene_gt_coco.json": make_coco(scene, config, files),
-        }
-    for name, content in (*written.items(), (DETECTIONS, files.detections)):
+        written["scene_gt_coco.json"] = make_coco(detections, (config.width, config.height))
+    for name, content in (*written.items(), (DETECTIONS, detections)):
         write_file(out / name, json.dumps(content))
 
 
@@ -125,45 +124,20 @@ def _write_png(path: Path, pixels: NDArray[Any]) -> None:
     write_file(path, imageio.imwrite("<bytes>", pixels, extension=".png", **how))
 
 
-def _describe_image(
-    photograph: Photograph,
-    depth: Array,
-    view: ViewPair,
-    poses: Poses,
-    where: tuple[int, int],
-    description: ImageDescription,
-    files: SceneFiles,
-) -> None:
-    """Add camera, true poses, visible fractions and detections of an image to the files of its scene.
-
-    Detections are in the order of their boxes, which does not tell identical parts apart.
-
-    Args:
-        depth: As measured, (height, width), [m].
-        where: Scene and image.
-    """
-    scene, image = where
-    T_view = pose.inverse(view.published.T_world_view)
-    files.camera[str(image)] = {
-        "cam_K": view.published.K.ravel().tolist(),
-        "cam_R_w2c": T_view[:3, :3].ravel().tolist(),
-        "cam_t_w2c": (1e3 * T_view[:3, 3]).tolist(),
+def _describe_camera(view: PinholeView) -> dict[str, Any]:
+    """The entry of `scene_camera.json` of a camera."""
+    T = pose.inverse(view.T_world_view)
+    return {
+        "cam_K": view.K.ravel().tolist(),
+        "cam_R_w2c": T[:3, :3].ravel().tolist(),
+        "cam_t_w2c": (1e3 * T[:3, 3]).tolist(),
         "depth_scale": DEPTH_SCALE,
     }
-    entries, facts, detections = [], [], []
-    for part, number in description.scenes[str(scene)].parts.items():
-        T = pose.inverse(view.true.T_world_view) @ poses[part] @ description.offset(number)
-        entries.append(
-            {"obj_id": number, "cam_R_m2c": T[:3, :3].ravel().tolist(), "cam_t_m2c": (1e3 * T[:3, 3]).tolist()}
-        )
-        visible = photograph.visible[part]
-        fact = _measure_visibility(visible, photograph.whole[part], depth)
-        facts.append(fact)
-        if fact["visib_fract"] >= _LEAST_VISIBLE:
-            detections.append(_make_detection(scene, image, number, visible))
-    files.detections.extend(sorted(detections, key=lambda each: each["bbox"]))
-    files.gt[str(image)] = entries
-    files.gt_info[str(image)] = facts
+
+
+def _describe_pose(number: int, T: Array) -> dict[str, Any]:
+    """The entry of `scene_gt.json` of an object at a pose, (4, 4), camera from model, [m]."""
+    return {"obj_id": number, "cam_R_m2c": T[:3, :3].ravel().tolist(), "cam_t_m2c": (1e3 * T[:3, 3]).tolist()}
 
 
 def _measure_visibility(visible: Mask, whole: Silhouette, depth: Array) -> dict[str, Any]:
@@ -182,51 +156,16 @@ def _measure_visibility(visible: Mask, whole: Silhouette, depth: Array) -> dict[
     }
 
 
-def _make_detection(scene: int, image: int, number: int, visible: Mask) -> dict[str, Any]:
-    """A detection as pose estimators of the BOP benchmark read it."""
+def _make_detection(where: tuple[int, int, int], visible: Mask) -> dict[str, Any]:
+    """A detection as pose estimators of the BOP benchmark read it.
+
+    Args:
+        where: Scene, image and object.
+    """
     return {
-        "scene_id": scene,
-        "image_id": image,
-        "category_id": number,
+        **dict(zip(("scene_id", "image_id", "category_id"), where, strict=True)),
         "bbox": find_box(*np.nonzero(visible)),
         "score": 1.0,
         "time": 0.0,
         "segmentation": encode_mask(visible),
     }
-
-
-def encode_mask(mask: Mask) -> dict[str, Any]:
-    """A mask as COCO's uncompressed run lengths, column by column; the first run is of pixels that are not set."""
-    flat = mask.ravel(order="F").tolist()
-    runs = [len(list(group)) for _, group in groupby(flat)]
-    return {"counts": [0] * bool(flat[0]) + runs, "size": list(mask.shape)}
-
-
-def decode_mask(encoded: Mapping[str, Any]) -> Mask:
-    """The mask of COCO's uncompressed run lengths, the inverse of `encode_mask`."""
-    counts = np.array(encoded["counts"])
-    flat = np.repeat(np.arange(len(counts)) % 2 == 1, counts)
-    return flat.reshape(encoded["size"], order="F")
-
-
-def make_coco(scene: SceneEntry, config: ImageConfig, files: SceneFiles) -> dict[str, Any]:
-    """The visible parts of all images of a scene in COCO format."""
-    images = [
-        {"id": int(image), "file_name": f"rgb/{int(image):06d}.png", "width": config.width, "height": config.height}
-        for image in files.camera
-    ]
-    annotations = [
-        {
-            "id": k,
-            "image_id": each["image_id"],
-            "category_id": each["category_id"],
-            "bbox": each["bbox"],
-            "area": sum(each["segmentation"]["counts"][1::2]),
-            "segmentation": each["segmentation"],
-            "iscrowd": 0,
-            "ignore": False,
-        }
-        for k, each in enumerate(files.detections, start=1)
-    ]
-    categories = [{"id": k, "name": str(k), "supercategory": "part"} for k in sorted({*scene.parts.values()})]
-    return {"images": images, "annotations": annotations, "categories": categories}

@@ -22,7 +22,7 @@ from apo_bench.formats.bop_images import (
     SceneEntry,
     find_images,
     read_cameras,
-    read_description,
+    read_image_description,
 )
 from apo_bench.geometry import Array, find_nearest_equivalent_pose, measure_extent, pose
 from apo_bench.perception.observation.models.camera import Camera
@@ -72,8 +72,7 @@ class PoseResults:
         for number, scene in self.description.scenes.items():
             if (scene.scenario, scene.seed, scene.clearance_mm, drawn) == key:
                 folder = self.folder / self.description.split / f"{int(number):06d}"
-                cameras = read_cameras(folder) if folder.is_dir() else {}  # a failed demonstration has no images
-                return TrialResults(self, int(number), scene, cameras, turns)
+                return TrialResults(self, int(number), scene, read_cameras(folder), turns)
         seeds = sorted(scene.seed for scene in self.description.scenes.values() if scene.scenario == key.scenario)
         shown = f"seeds {seeds[0]} to {seeds[-1]}" if seeds else "none"
         raise InputError(
@@ -220,7 +219,7 @@ def read_pose_results(path: Path, noise_level: NoiseLevel, fitted: MeasuredNoise
     """
     require(path.is_file(), f"there is no results file '{path}'; name one that exists.")
     folder = find_images(path)
-    description = read_description(folder)
+    description = read_image_description(folder)
     rows = _read_rows(path, path.stat().st_mtime_ns)
     known = {(int(number), int(image)) for number, scene in description.scenes.items() for image in scene.images}
     for row, (scene, image, _) in enumerate(rows.where.tolist()):
