@@ -97,7 +97,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "contacts": "pairs `[face of what moves, part.face of what rests]`, or tables",
             "attach": "a preference for the way to the goal; default it is found",
             "grasp": "where the gripper takes the part; default above the middle of boxes, or as its shape offers",
-            "clamp": "whether the part is fixed where it is placed once its seat is felt, as by screws; default false",
+            "clamp": "whether the part is fixed once it presses on its seat, as by screws; default false",
             "vary": "a shift or a turn that each trial draws, or a list of them (20 in a scenario at most)",
         },
         "operations, contacts": {

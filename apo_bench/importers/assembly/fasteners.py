@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +29,6 @@ _COAXIAL_MM = 0.1  # largest offset of the axes of a shank and its hole
 _PARALLEL = 1e-3  # largest sine of the angle between them
 _TOUCHES_MM = 0.15
 """A fastener holds the parts within this distance."""
-
-
-_SCREW_HOLE_MM = (0.5, 4.5)  # least and largest radius of the hole of a screw
-_BESIDE_MM = 0.5  # gap along the axis between the holes of one screw
 
 
 class Fastener(NamedTuple):
@@ -69,24 +65,6 @@ def list_held_places(parts: Sequence[RawSolid], fasteners: Sequence[RawSolid]) -
     return held
 
 
-def list_places_with_screw_holes(parts: Sequence[RawSolid]) -> set[tuple[int, int]]:
-    """Return the copies of parts whose narrow holes continue those of another copy, as index of the part and of its
-    place: screws belong there, although they are not drawn."""
-    copies = [(i, k) for i, raw in enumerate(parts) for k in range(len(raw.places))]
-    holes = [[region for region in raw.regions if _is_screw_hole(region)] for raw in parts]
-    found = set[tuple[int, int]]()
-    for a, b in combinations(copies, 2):
-        T = pose.inverse(parts[a[0]].places[a[1]].T) @ parts[b[0]].places[b[1]].T
-        if any(_is_coaxial(one, other, T, _BESIDE_MM) for one, other in product(holes[a[0]], holes[b[0]])):
-            found |= {a, b}
-    return found
-
-
-def _is_screw_hole(region: Region) -> bool:
-    """Whether a round region is a hole as narrow as those of screws."""
-    return region.kind == "cylinder" and region.hole and _SCREW_HOLE_MM[0] <= max(region.radii) <= _SCREW_HOLE_MM[1]
-
-
 def _recognise(raw: RawSolid, others: Sequence[RawSolid]) -> str:
     """Return how a solid shows that it is a fastener; empty if it does not."""
     named = next((match[0] for name in (raw.name, *(p.name for p in raw.places)) if (match := _NAME.search(name))), "")
@@ -119,17 +97,11 @@ def _list_relative_poses(raw: RawSolid, other: RawSolid) -> Iterator[Array]:
         yield pose.inverse(own.T) @ its.T
 
 
-def _is_coaxial(a: Region, b: Region, T: Array, beside_mm: float | None = None) -> bool:
-    """Whether two round regions have one axis and meet along it.
-
-    Args:
-        T: (4, 4), pose of the solid of the second region in the frame of the first.
-        beside_mm: Largest gap along the axis; None: the radius of the first.
-    """
+def _is_coaxial(a: Region, b: Region, T: Array) -> bool:
+    """Whether two round regions have one axis and meet along it; T is the pose of the second one's solid."""
     ends = b.ends @ T[:3, :3].T + T[:3, 3] - a.point
     height = ends @ a.direction
     off = np.linalg.norm(ends - np.outer(height, a.direction), axis=1)
     is_parallel = abs(float(np.diff(height)[0])) > (1.0 - _PARALLEL) * float(np.linalg.norm(ends[1] - ends[0]))
     gap = max(height.min(), a.span[0]) - min(height.max(), a.span[1])
-    meets = a is b or gap <= (max(a.radii) if beside_mm is None else beside_mm)
-    return bool(off.max() < _COAXIAL_MM and is_parallel and meets)
+    return bool(off.max() < _COAXIAL_MM and is_parallel and gap <= max(a.radii))

@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
-from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places, list_places_with_screw_holes
+from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places
 from apo_bench.importers.assembly.misplaced import describe_misplaced
 from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
 from apo_bench.importers.assembly.shaving import shave_overlaps
@@ -184,14 +184,7 @@ def _leave_out_fasteners(found: _Found, choice: str, lines: _Report) -> tuple[_F
     for raw, why in fasteners.values():
         copies = f", {len(raw.places)} copies" if len(raw.places) > 1 else ""
         lines.add(f"{clean_title(raw.name)}{copies}: a fastener ({why}); what it holds is clamped where it is placed")
-    if choice != "clamp":
-        return kept, set()
-    parts = [raw for _, raw in kept]
-    not_drawn = list_places_with_screw_holes(parts)
-    if not_drawn:
-        names = ", ".join(sorted({clean_title(parts[i].name) for i, _ in not_drawn}))
-        lines.add(f"{names}: holes continue each other, so screws belong there; a part that only they hold is clamped")
-    return kept, list_held_places(parts, [raw for raw, _ in fasteners.values()]) | not_drawn
+    return kept, list_held_places([raw for _, raw in kept], [raw for raw, _ in fasteners.values()])
 
 
 def _find_foot(raw: RawSolid) -> Array:

@@ -53,8 +53,6 @@ class Placement(NamedTuple):
     """(4, 4), goal of the main part in the frame of the assembly, [m]."""
     why: str
     """The reason as a phrase: the direction of insertion and the parts that carry the main part."""
-    way: Array
-    """(3,), direction of insertion in the frame of the assembly, unit vector."""
     clamped: bool = False
     """Whether only fasteners, which are no parts, hold the main part."""
     along: Array | None = None
@@ -191,7 +189,7 @@ class OrderSearch:
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
         stated = None if falls is None else arrival.line.direction
         why = f"comes {direction}, onto {others}"
-        return Placement(tuple(moves), contacts, poses[main], why, way, falls is not None, stated)
+        return Placement(tuple(moves), contacts, poses[main], why, falls is not None, stated)
 
     def _find_fall(
         self, moves: Sequence[str], rest: Sequence[str], contacts: tuple[Contact, ...], assembly: Assembly, others: str

@@ -135,7 +135,7 @@ def _list_operation_lines(new: NewScenario, placing: Placement) -> Iterator[str]
     if placing.along is not None:
         yield f"attach = {{ along = {_format_list(placing.along)} }}"
     if placing.clamped:
-        yield "clamp = true  # a fastener that is no part holds it: it is fixed here once its seat is felt"
+        yield "clamp = true  # a fastener that is no part holds it: it is fixed here once it presses on its seat"
     yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]
     hold = new.grasps[main]
     if hold is not None:

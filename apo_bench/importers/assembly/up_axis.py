@@ -7,7 +7,6 @@ from dataclasses import replace
 from apo_bench.errors import InputError, require
 from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
-from apo_bench.importers.assembly.enclosed_faces import add_clearance_between
 from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, find_lowest_part, new_scenario
 from apo_bench.importers.assembly.posed_parts import PosedPart, place_on_table
 
@@ -30,11 +29,6 @@ def new_upright_scenario(parts: Sequence[PosedPart], choices: AssemblyChoices = 
         f"{len(fits)} pairs of parts have no play: {'; '.join(fits)}. Give fits = auto to change them so, or refuse.",
     )
     scenario, assumed = _try_fastened(parts, choices)
-    if choices.most_overlap_mm:
-        parts, between = add_clearance_between(parts, scenario.order, clearance_mm)
-        if between:
-            scenario, assumed = _try_fastened(parts, choices)
-            notes += between
     return replace(scenario, notes=(*fits, *notes, *assumed, *scenario.notes))
 
 

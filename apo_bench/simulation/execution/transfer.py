@@ -124,7 +124,7 @@ class Transfer:
     side_touches: tuple[Any, ...] = ()
     """`SideTouch` each: touches of a wall with the side of the part, before an insertion from above."""
     clamps_to: str = ""
-    """The part to which the part is clamped once its seat is felt; empty if it is not clamped."""
+    """The part to which the part is clamped once it presses on its seat; empty if it is not clamped."""
     lands: bool = True
     """Whether another part carries it at its goal, so that a level motion ends by lowering it."""
     roofed: bool = False

@@ -9,7 +9,6 @@ import pytest
 
 from apo_bench.geometry import Solid, shrink_pieces
 from apo_bench.importers.assembly.added_clearance import add_clearance
-from apo_bench.importers.assembly.choices import AssemblyChoices
 from apo_bench.importers.assembly.posed_parts import PosedPart
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.importers.assembly.up_axis import new_upright_scenario
@@ -59,22 +58,3 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
 ) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
     assert add_clearance(parts, clearance, most) == (parts, (), ())
-
-
-def test_a_tongue_between_walls_of_two_parts_gets_play_and_parts_of_a_pile_do_not(tmp_path: Path) -> None:
-    wall = extrude(make_rectangle(15, 50), 0, 30, bottom="foot", top="head")
-    tongue = extrude(make_rectangle(20, 30), 0, 35, bottom="foot", top="head")
-    parts = made(
-        tmp_path,
-        base=(FLOOR, (0, 0, 0)),
-        left=(wall, (-17.5, 0, 10)),
-        right=(wall, (17.5, 0, 10)),
-        tongue=(tongue, (0, 0, 10)),
-        cap=(extrude(make_rectangle(16, 16), 0, 12, bottom="foot", top="head"), (0, 0, 45)),
-    )
-    found = new_upright_scenario(parts, AssemblyChoices("z", ("base", "left", "right")))
-    fits = {each.name: sorted(each.fit.values()) for each in found.parts}
-    assert fits == {"base": [], "left": [], "right": [], "tongue": [0.0, 0.0], "cap": []}
-    assert any(note.startswith("'tongue' was drawn without play between two other parts") for note in found.notes)
-    kept = new_upright_scenario(parts, AssemblyChoices("z", ("base", "left", "right"), fits="refuse"))
-    assert all(not each.fit for each in kept.parts)

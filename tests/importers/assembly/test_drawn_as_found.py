@@ -1,10 +1,9 @@
-"""Assemblies as people draw them: dowels flush with a cover, small tilts, high piles, meshing teeth, names of nuts."""
+"""Assemblies as people draw them: dowels flush with a cover, small tilts, thick shafts, names of nuts."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
@@ -14,7 +13,7 @@ from apo_bench.importers.assembly.posed_parts import place_on_table
 from apo_bench.importers.assembly.scenario_check import check_file
 from apo_bench.importers.assembly.scenario_writer import write_scenario
 from apo_bench.importers.assembly.up_axis import new_upright_scenario
-from apo_bench.scenario.parts.making import Body, bore, extrude, make_polygon, make_rectangle, make_shaft
+from apo_bench.scenario.parts.making import Body, bore, extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_blocked import made, turned
 
 SLAB = extrude(make_rectangle(80, 60), 0, 15, bottom="bottom", top="top")
@@ -48,44 +47,6 @@ def test_a_part_that_is_hardly_tilted_gets_a_grasp_that_can_be_read(
     parts = turned(made(tmp_path, slab=(SLAB, (0, 0, 0)), cube=(CUBE, (0, 0, 15))), *tilt)
     write_scenario(new_upright_scenario(parts), tmp_path / "own.toml", "own", "a test")
     assert len(load_scenario(tmp_path / "own.toml").assembly) == 1
-
-
-def test_parts_of_a_high_pile_start_where_the_arm_can_lift_them_over_it(tmp_path: Path) -> None:
-    tower = extrude(make_rectangle(60, 60), 0, 205, bottom="foot", top="head")
-    base = extrude(make_rectangle(100, 80), 0, 15, bottom="bottom", top="top")
-    pile = {f"t{i}": (tower, (0.0, 0.0, 15.0 + 205 * i)) for i in range(3)}
-    parts = made(tmp_path, base=(base, (0, 0, 0)), **pile)
-    write_scenario(new_upright_scenario(parts, AssemblyChoices("z")), tmp_path / "own.toml", "own", "a test")
-    far = [each.sentence for each in check_file(tmp_path / "own.toml", seeds=0) if not each.ok]
-    assert not [sentence for sentence in far if "start" in sentence]
-
-
-def gear(phase: float) -> Body:
-    """Twelve teeth of 5 mm."""
-    shares, radii = np.array([0.0, 0.2, 0.5, 0.7]), np.array([14.0, 19.0, 19.0, 14.0])
-    angle = (2 * np.pi * (np.arange(12)[:, None] + shares) / 12 + phase).ravel()
-    radius = np.tile(radii, 12)
-    corners = zip((radius * np.cos(angle)).tolist(), (radius * np.sin(angle)).tolist(), strict=True)
-    return extrude(make_polygon(*corners), 0, 10, bores=[bore((0, 0), 5.2, 0, 10, "bore")], bottom="foot", top="head")
-
-
-@pytest.mark.parametrize("apart", [34.0, 40.0])
-def test_teeth_that_mesh_although_the_contacts_leave_the_turn_free_are_noted(apart: float, tmp_path: Path) -> None:
-    post = make_shaft(5, 0, 25, "side", bottom="tip", top="head")
-    x = apart / 2
-    parts = made(
-        tmp_path,
-        plate=(extrude(make_rectangle(120, 60), 0, 10, bottom="bottom", top="top"), (0, 0, 0)),
-        post1=(post, (-x, 0, 10)),
-        post2=(post, (x, 0, 10)),
-        gear1=(gear(-0.35 * np.pi / 6), (-x, 0, 10)),
-        gear2=(gear(np.pi - 0.85 * np.pi / 6), (x, 0, 10)),
-    )
-    notes = [
-        note for note in new_scenario(place_on_table(parts), ("plate", "post1", "post2")).notes if "may turn" in note
-    ]
-    assert len(notes) == (apart < 36)
-    assert all("meets 'gear2' after 1 degrees" in note or "meets 'gear1' after 1 degrees" in note for note in notes)
 
 
 def test_the_name_of_a_nut_is_no_fault(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import trimesh
 from apo_bench import build_scene, draw_layout, load_scenario, replay, run_trial
 from apo_bench.assembly import Plan
 from apo_bench.importers.assembly.choices import AssemblyChoices
-from apo_bench.importers.assembly.fasteners import find_fasteners, list_places_with_screw_holes
+from apo_bench.importers.assembly.fasteners import find_fasteners
 from apo_bench.importers.assembly.from_cad import import_parts
 from apo_bench.importers.assembly.new_scenario import NoAssemblyOrder
 from apo_bench.importers.assembly.posed_parts import read_posed
@@ -66,13 +66,6 @@ def test_fasteners_are_left_out_and_what_they_touch_is_marked(tmp_path: Path) ->
     assert any(line.startswith("a: a fastener (its shank overlaps a hole") for line in lines)
     poses, _, _ = import_parts(given, tmp_path / "all", "mm", AssemblyChoices(fasteners="parts"))
     assert {each.name for each in read_posed(poses)} == {"plate", "cover", "a", "lid"}
-
-
-def test_holes_that_continue_each_other_show_that_screws_belong_there(tmp_path: Path) -> None:
-    parts = raws(tmp_path, plate=PLATE, cover=COVER, lid=block(20, 20, 5, (20, 0, 30)))
-    assert list_places_with_screw_holes(parts) == {(0, 0), (1, 0)}
-    aside = COVER.translate((3, 0, 0))
-    assert list_places_with_screw_holes(raws(tmp_path, plate=PLATE, cover=aside)) == set()
 
 
 def test_a_solid_is_skipped_as_asked_and_one_that_makes_no_part_is_left_out(tmp_path: Path) -> None:
