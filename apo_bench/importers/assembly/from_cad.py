@@ -147,7 +147,11 @@ def _shave_parts(
             replace(piece, name="") if isinstance(piece, Hull) else Hull("", piece.corners) for piece in pieces
         )
         cut = CutSolid(hulls, 1, tuple(part.cut.filled), coarse=True)
-        import_solid(part.raw, file.stem, file.parent, source, choices.density, pieces=cut)
+        try:
+            import_solid(part.raw, file.stem, file.parent, source, choices.density, pieces=cut)
+        except InputError:
+            import_solid(part.raw, file.stem, file.parent, source, choices.density, pieces=part.cut)
+            lines.add(f"the overlaps of '{file.stem}' stay as drawn: cutting them off would take the part apart")
     for line in shaved.lines:
         lines.add(line)
 
