@@ -56,6 +56,7 @@ _EXPORTS = MappingProxyType(
         "detect_contacts": "apo_bench.perception.detection.greedy_detection",
         "draw_layout": "apo_bench.scenario.layout",
         "evaluate": "apo_bench.benchmark.evaluation",
+        "evaluate_policy": "apo_bench.envs.evaluation",
         "explain": "apo_bench.correction.explanation",
         "fit_plan": "apo_bench.trial.plan_fitting",
         "import_assembly": "apo_bench.importers.from_python",

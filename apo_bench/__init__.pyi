@@ -16,6 +16,7 @@ from apo_bench.correction.contact.contact import ContactCorrector as ContactCorr
 from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import CorrectPoses as CorrectPoses
+from apo_bench.envs.evaluation import evaluate_policy as evaluate_policy
 from apo_bench.envs.flatten import Flatten as Flatten
 from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from apo_bench.arguments import check_arguments
 from apo_bench.envs.apo_insert import APOInsert
 from apo_bench.envs.policies import POLICIES, MakePolicy
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError
 from apo_bench.names import resolve
 
 REASONS = ("never entered", "stopped inside", "moved parts", "out of time", "force")
@@ -55,8 +55,9 @@ def evaluate_policy(env: Any, policy: Any, trials: Iterable[int]) -> Iterator[Ep
     Raises:
         InputError: Another environment, or there is no such policy.
     """
-    base = env.unwrapped
-    require(isinstance(base, APOInsert), f"a policy of APOInsert-v0 was given {base}; give an APOInsert environment.")
+    base = getattr(env, "unwrapped", None)
+    if not isinstance(base, APOInsert):
+        raise InputError("env must be an environment of APOInsert-v0, with or without wrappers.")
     make: MakePolicy = resolve(policy, POLICIES, "policy")
     return _run(env, base, make, trials)
 

@@ -27,7 +27,7 @@ POLICIES: Mapping[str, str] = MappingProxyType(
         "expert": "apo_bench.envs.policies:expert",
         "probe": "apo_bench.envs.policies:straight",
         "searcher": "apo_bench.envs.searcher:Searcher",
-        "spiral": "apo_bench.envs.spiral:Spiral",
+        "spiral": "apo_bench.envs.spiral:SpiralPolicy",
         "straight": "apo_bench.envs.policies:straight",
     }
 )

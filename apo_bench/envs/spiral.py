@@ -25,7 +25,7 @@ _SIDE_N = 1.9  # side force above the push at which walls hold the part
 
 
 @final
-class Spiral:
+class SpiralPolicy:
     """A spiral across the insertion axis where the approach is stopped, as long as the part meets resistance."""
 
     def __init__(self, env: APOInsert) -> None:

@@ -13,7 +13,7 @@ from apo_bench.envs.apo_insert import APOInsert
 from apo_bench.envs.evaluation import evaluate_policy, find_reason
 from apo_bench.envs.policies import POLICIES, expert, insert_env, straight
 from apo_bench.envs.searcher import Searcher
-from apo_bench.envs.spiral import Spiral
+from apo_bench.envs.spiral import SpiralPolicy
 from apo_bench.names import resolve
 
 
@@ -82,7 +82,7 @@ def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_on_where_it_is
 
 
 def test_the_spiral_covers_its_radius_and_goes_on_with_a_turn(env: APOInsert) -> None:
-    actions = stop(Spiral(env), 600)
+    actions = stop(SpiralPolicy(env), 600)
     across = 4.0 * np.hypot(*actions[:, :2].T)
     assert across.max() == pytest.approx(2.0, abs=0.1)
     assert {round(3.0 * turn) for turn in actions[:, 5]} >= {0, 1}
