@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from apo_bench import TrialConfig, load_scenario
@@ -26,6 +27,7 @@ from apo_bench.perception.observation.fitting.fit import fit_noise
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.noise_file import format_noise_file, list_presets, read_noise
 from apo_bench.records import FIRST_TRAINING_TRIAL
+from benchmarks.provenance import with_mujoco
 from benchmarks.rates_by_condition import table
 
 ROOT = Path(__file__).parents[1]
@@ -138,7 +140,7 @@ def write_page(rows: dict[float, list[dict[str, float | str]]], residuals: dict[
         ),
         "",
     ]
-    PAGE.write_text("\n".join(text), encoding="utf-8")
+    PAGE.write_text(with_mujoco("\n".join(text), [mujoco.__version__]), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
