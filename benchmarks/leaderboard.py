@@ -45,16 +45,16 @@ def in_readme(text: str) -> str:
 
 
 def outcome(of: Sequence[Entry]) -> str:
-    """Return how good the best methods are that do not have the true poses, and the bound, or that trials are few."""
-    if any(entry.has_few_trials for entry in of):
-        return "The entries have few trials of each condition: the intervals are wide.\n\n"
+    """Return how good the best methods are that do not have the true poses, the bound, and which have few trials."""
     scores = {line.entry.name: line.score for line in ranked(of) if line.score is not None}
     bound = scores.pop("oracle")
     (first, best), (second, next_best) = [*scores.items()][:2]
     words = "{:.1f} ({:.1f} to {:.1f})"
+    named = ", ".join(f"`{entry.name}`" for entry in of if entry.has_few_trials)
+    few = f" Few trials of each condition so far: {named}." if named else ""
     return (
         f"`{first}` leads with a score of {words.format(*best)}, before `{second}` with {words.format(*next_best)}. "
-        f"The bound is `oracle`, which has the true poses, with {words.format(*bound)}.\n\n"
+        f"The bound is `oracle`, which has the true poses, with {words.format(*bound)}.{few}\n\n"
     )
 
 
