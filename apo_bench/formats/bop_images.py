@@ -20,6 +20,9 @@ from apo_bench.io import FileTable, Finite, Text, Triple, read_typed
 DESCRIPTION = "apo_trials.json"
 CAMERAS = "scene_camera.json"
 MODELS_INFO = "models_info.json"
+TRUTH, VISIBILITY = "scene_gt.json", "scene_gt_info.json"
+LEAST_VISIBLE = 0.1
+"""A part of which a smaller fraction is visible is no target, as in the BOP benchmark."""
 _LARGEST_BYTES = 64_000_000
 _LEVELS = 3  # folders above a file in which the description is looked for
 _Id = Annotated[int, Meta(ge=0, le=LARGEST_ID)]

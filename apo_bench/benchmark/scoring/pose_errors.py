@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.formats.bop import PoseRows
-from apo_bench.formats.bop_images import MODELS_INFO, ImageDescription, read_cameras
+from apo_bench.formats.bop_images import LEAST_VISIBLE, MODELS_INFO, TRUTH, VISIBILITY, ImageDescription, read_cameras
 from apo_bench.formats.bop_models import ObjectSymmetry, read_symmetries
 from apo_bench.geometry import Array, pose
 from apo_bench.io import read_plain
@@ -25,7 +25,6 @@ _PIXELS = np.arange(1, 11) * 5.0
 _WIDTH_PX = 640.0
 _ADD_SHARES = np.array([0.1])
 """Threshold of ADD(-S), relative to the diameter."""
-_LEAST_VISIBLE = 0.1
 _FEW_SYMMETRIES = 64  # up to so many, all vertices count
 _NOTHING = ObjectSymmetry(np.eye(4)[None])
 
@@ -108,12 +107,12 @@ def _list_targets(
     place = folder / description.split / f"{scene:06d}"
     if not place.is_dir():
         return
-    truth = json.loads((place / "scene_gt.json").read_text(encoding="utf-8"))
-    facts = json.loads((place / "scene_gt_info.json").read_text(encoding="utf-8"))
+    truth = json.loads((place / TRUTH).read_text(encoding="utf-8"))
+    facts = json.loads((place / VISIBILITY).read_text(encoding="utf-8"))
     for image, camera in read_cameras(place).items():
         of_object: dict[int, list[Any]] = {}
         for entry, fact in zip(truth[str(image)], facts[str(image)], strict=True):
-            if fact["visib_fract"] >= _LEAST_VISIBLE:
+            if fact["visib_fract"] >= LEAST_VISIBLE:
                 of_object.setdefault(entry["obj_id"], []).append(entry)
         for number, entries in of_object.items():
             T = pose.rigid([np.reshape(e["cam_R_m2c"], (3, 3)) for e in entries], [e["cam_t_m2c"] for e in entries])

@@ -2,16 +2,15 @@
 
 import json
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Demonstration, Poses
+from apo_bench.assembly import Demonstration, compute_placements
 from apo_bench.benchmark.datasets.images.views import draw_views, number_images
-from apo_bench.formats.bop_images import CAMERAS, ImageDescription
+from apo_bench.formats.bop_images import CAMERAS, LEAST_VISIBLE, TRUTH, VISIBILITY, ImageDescription
 from apo_bench.formats.coco import encode_mask, make_coco
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_file
@@ -20,22 +19,10 @@ from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photograph
 
 DETECTIONS = "scene_detections.json"
 """The detections of one scene, written last, so that a scene with this file is complete."""
-TRUTH, VISIBILITY = "scene_gt.json", "scene_gt_info.json"
 DEPTH_SCALE = 0.1
 """[mm] of one step in a depth image."""
 _FARTHEST_MM = 6500.0  # depth that 16 bits hold
 _DROPOUTS = 0.01  # fraction of pixels without a reading, if there is noise
-_LEAST_VISIBLE = 0.1
-"""A part of which a smaller fraction is visible is no target, as in the BOP benchmark."""
-
-
-def list_moments(demonstration: Demonstration) -> Iterator[Poses]:
-    """Yield the poses of all parts after each operation; carried parts move with the main one."""
-    now = dict(demonstration.start)
-    for operation, T in zip(demonstration.assembly.operations, demonstration.poses, strict=True):
-        step = T @ pose.inverse(now[operation.main])
-        now = now | {part: step @ now[part] for part in operation.carries} | {operation.main: T}
-        yield now
 
 
 def write_scene(
@@ -58,7 +45,7 @@ def write_scene(
     is_secret = description.secret_seed is not None
     for folder in ("depth", *["rgb"] * (not config.no_rgb), *["mask", "mask_visib"] * (not is_secret)):
         (out / folder).mkdir(parents=True, exist_ok=True)
-    moments = list(list_moments(demonstration))
+    moments = compute_placements(demonstration.assembly, demonstration.start, demonstration.poses)
     views = draw_views(config, rng)
     if config.randomise:
         photographer.vary(rng)
@@ -77,7 +64,7 @@ def write_scene(
         seen = [
             _make_detection((number, image, k), photograph.visible[part])
             for (part, k), fact in zip(parts.items(), facts, strict=True)
-            if fact["visib_fract"] >= _LEAST_VISIBLE
+            if fact["visib_fract"] >= LEAST_VISIBLE
         ]
         detections += sorted(seen, key=lambda each: each["bbox"])  # an order that does not tell equal parts apart
     written: dict[str, Any] = {CAMERAS: files[CAMERAS]} if is_secret else dict(files)
