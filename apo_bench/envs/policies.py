@@ -1,5 +1,6 @@
 """Policies of `APOInsert-v0` by name, behind one protocol, and the environment that they act in."""
 
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Protocol, TypeAlias
@@ -58,6 +59,18 @@ def expert(env: APOInsert) -> Policy:
 def with_hand(env: APOInsert, action: Array) -> Array:
     """Return six numbers as an action of an environment, whose hand is left to the approach."""
     return np.concatenate([action, np.zeros(env.action_size - 6)])
+
+
+def aim_at(env: APOInsert, target: Array, ahead: float = 0.0) -> Array:
+    """Return the action that moves the front of the part to a target, (6,), [mm, deg], and it along the axis.
+
+    Args:
+        target: Displacement from the line into the estimated hole; the third number has no effect.
+        ahead: The number of the action for the step along the axis.
+    """
+    action = target / (env.target.reach * np.repeat([1e3, 180.0 / math.pi], 3))
+    action[2] = ahead
+    return with_hand(env, action)
 
 
 def insert_env(settings: TrialConfig, policy: str = "straight", **more: Any) -> APOInsert:

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.envs.apo_insert import APOInsert
-from apo_bench.envs.policies import with_hand
+from apo_bench.envs.policies import aim_at
 from apo_bench.geometry import Array
 
 _FILTER = 0.25  # weight of the newest wrench
@@ -47,7 +47,6 @@ class Searcher:
 
     def __init__(self, env: APOInsert) -> None:
         self._env = env
-        self._reach = env.target.reach * np.repeat([1e3, 180.0 / math.pi], 3)
         self._phase = self._approach
         self._target = np.zeros(6)  # [mm, deg]
         self._middle = np.zeros(2)  # of the ellipse, [mm]
@@ -70,9 +69,7 @@ class Searcher:
         self._waited = 0 if progress else self._waited + 1
         self._best = min(self._best, left)
         ahead = self._phase(left, np.asarray(observation["plan"][6:12], np.float64))
-        action = self._target / self._reach
-        action[2] = ahead
-        return with_hand(self._env, action)
+        return aim_at(self._env, self._target, ahead)
 
     def _approach(self, left: float, deviations: Array) -> float:
         """Leave the motion to the approach until contact stops it."""

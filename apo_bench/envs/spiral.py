@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.envs.apo_insert import APOInsert
-from apo_bench.envs.policies import with_hand
+from apo_bench.envs.policies import aim_at
 from apo_bench.geometry import Array
 
 _PITCH_MM = 0.35  # between the turns of the spiral
@@ -30,7 +30,6 @@ class SpiralPolicy:
 
     def __init__(self, env: APOInsert) -> None:
         self._env = env
-        self._reach = env.target.reach * np.repeat([1e3, 180.0 / math.pi], 3)
         self._best = math.inf
         self._waited = 0
         self._stopped: float | None = None
@@ -48,7 +47,7 @@ class SpiralPolicy:
             self._waited = self._waited + 1 if push < self._press / 4 else 0
             if not 0 < self._waited < _PATIENCE:
                 self._search(push, math.hypot(*observation["wrench"][:2]))
-        return with_hand(self._env, self._target / self._reach)
+        return aim_at(self._env, self._target)
 
     def _approach(self, left: float, push: float) -> None:
         """Leave the motion to the approach, and note where it is stopped."""
