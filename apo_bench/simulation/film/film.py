@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
@@ -58,7 +57,7 @@ def frames(
             for size, states in ((_SIZE, [assembled]), (_INSET, [assembled, segment.start])):
                 framing = frame_parts(assembly, states, headroom_m=_HEADROOM_M)
                 camera = aim_camera(*framing, FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)
-                views.append((stack.enter_context(renderer(segment.world.model, *size)), camera))
+                views.append((stack.enter_context(renderer(segment.world.model, *size, shadow_texels=0)), camera))
             data = make_initial_state(segment.world, segment.start)
             for moment, force_n, most_n in sample_moments(segment.moments, _SPEED / fps):
                 empty = moment.phase.macro in (BY_HAND, TOUCHING)
@@ -86,7 +85,6 @@ def _draw(
     pictures = []
     for draws, camera in views:
         draws.update_scene(data, camera=camera)
-        draws.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
         pictures.append(draws.render())
     return add_caption(pictures[0], pictures[1], caption)
 
