@@ -152,13 +152,13 @@ def tighter(found: Mapping[Place, Sequence[TrialRecord]]) -> Iterator[list[objec
 
 
 def _detection(found: Mapping[Place, Sequence[TrialRecord]]) -> str:
-    """Return a sentence: how often exactly the true contacts are detected, and how often `contact` succeeds with them."""
+    """Return how often exactly the true contacts are detected, and how often `contact` succeeds with them."""
     rows = [row for place, own in found.items() if place.contact_source == "detected" for row in own]
     rate = rate_of(rows)
     return (
         "At 0.5 mm and degrees with `--contact-source detected`, over all scenarios, without and with human error: "
-        f"exactly the true contacts were detected in {_detected(rows)} of {len(rows)} trials, and `contact` succeeds in "
-        f"{rate.successes} of {rate.trials} with them."
+        f"exactly the true contacts were detected in {_detected(rows)} of {len(rows)} trials, and `contact` succeeds "
+        f"in {rate.successes} of {rate.trials} with them."
     )
 
 
