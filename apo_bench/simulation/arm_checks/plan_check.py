@@ -37,7 +37,7 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     """
     predicted = list[ArmMove]()
     estimated = plan.start
-    for move in plan_moves(plan, scene, spiral, ()):
+    for move in plan_moves(plan, scene, spiral):
         operation = plan.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]

@@ -61,14 +61,14 @@ class Move(NamedTuple):
 
 
 @remember
-def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...]) -> tuple[Move, ...]:
+def plan_moves(plan: Plan, scene: Scene, spiral: bool, probes: bool = False) -> tuple[Move, ...]:
     """Return the move of each step of the schedule.
 
     Cached, since both the plan check and the execution need the moves.
 
     Args:
         spiral: Whether the robot searches for a hole when a motion into it is stopped.
-        actions: Of `PROBING_ACTIONS`; `square`, `lay` and `search` change the transfers.
+        probes: Whether the robot probes, which squares parts, lays them flat and searches in the last motion.
     """
     estimated: Poses = plan.start
     put_by: dict[str, int | None] = {}
@@ -95,8 +95,8 @@ def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...])
             put_by[operation.main] = k
         after = compute_transferred_poses(operation, target, estimated)
         transfer = _transfer(plan.assembly, scene, step, was, target, estimated, after, spiral)
-        if actions and not (step.undo or transfer.carried):
-            transfer = _with_actions(plan.assembly, scene, k, transfer, estimated, actions)
+        if probes and not (step.undo or transfer.carried):
+            transfer = _with_probing(plan.assembly, scene, k, transfer, estimated)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
         estimated = after
     return tuple(prepared)
@@ -117,7 +117,7 @@ def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False, ()))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
 
 
 def _transfer(
@@ -203,25 +203,22 @@ def holds_firmly(arm: Arm) -> bool:
     return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
 
 
-def _with_actions(
-    assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses, actions: tuple[str, ...]
-) -> Transfer:
-    """Return the transfer with probing actions.
+def _with_probing(assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses) -> Transfer:
+    """Return the transfer of a robot that probes.
 
     A part that is enclosed at its start, or touches another at its side, is neither squared nor laid down there.
     """
     free = not (t.out.level or t.away or t.drawn)
-    squared = "square" in actions and free
-    laid = "lay" in actions and (t.into.level or (bool(t.entrances) and free))
+    laid = t.into.level or (bool(t.entrances) and free)
     flat = find_flat_placement(assembly, scene, t, estimated) if laid else None
     side_touches = (
         () if flat is None or t.into.level else find_side_touches(assembly, scene, t, flat.T[:3, :3], estimated)
     )
     return replace(
         t,
-        in_last="search" in actions,
+        in_last=True,
         slow=t.slow if t.into.level else max(t.slow, max(t.entrances, default=0.0) + WALL_MARGIN_M),
-        squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if squared else (),
+        squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if free else (),
         flat=flat,
         side_touches=side_touches,
     )
