@@ -25,7 +25,7 @@ from apo_bench.envs.evaluation import evaluate_policy
 HELD_OUT = 40  # evaluation trials, from 0 on
 FIRST = 2_000_000  # the first trial of training
 BOUND = 10.0  # of observations, which are logarithms
-SIZES = {"shift_mm": 0.1, "turn_deg": 0.02, "reach_mm": 1.5, "reach_deg": 0.2}  # of actions
+SIZES: dict[str, Any] = {"shift_mm": 0.1, "turn_deg": 0.02, "reach_mm": 1.5, "reach_deg": 0.2}  # of actions
 
 
 class Insertion(gymnasium.ObservationWrapper[Any, Any, Any]):

@@ -146,8 +146,9 @@ class Searcher:
         if self._angle > whole:
             self._searches += 1
             self._angle = 0.0
-        along = axes * (-math.sin(self._angle), math.cos(self._angle))  # of the largest ellipse, for each radian
-        self._angle += _STEP_MM / max(self._angle / whole * math.hypot(*along), _PITCH_MM)
+        along = math.hypot(axes[0] * math.sin(self._angle), axes[1] * math.cos(self._angle))  # for each radian
+        share = self._angle / whole  # of the largest ellipse
+        self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
         aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
         self._target[:2] = self._middle + self._angle / whole * aside
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
