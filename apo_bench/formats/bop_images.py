@@ -123,6 +123,16 @@ def find_images(path: Path) -> Path:
     )
 
 
+def list_image_files(results: Path) -> tuple[Path, ...]:
+    """The files of a data set of images without which its results file cannot be read: trials and cameras.
+
+    Raises:
+        InputError: The results file lies in no data set of images.
+    """
+    folder = find_images(results)
+    return folder / DESCRIPTION, *sorted(folder.glob(f"*/*/{CAMERAS}"))
+
+
 class PublishedCamera(msgspec.Struct, frozen=True):
     """The camera of an image as published, other keys ignored; the true one differs by the error of its calibration."""
 

@@ -54,8 +54,7 @@ def score_poses(
     Raises:
         InputError: A file is missing, deviates from its format, or is of other images.
     """
-    name = f"{ESTIMATES}{Path(results).resolve()}"
-    name += "" if estimator is None else f"{SEPARATOR}{Path(estimator).resolve()}"
+    name = f"{ESTIMATES}{results}" + ("" if estimator is None else f"{SEPARATOR}{estimator}")
     poses = make_noise(name, NoiseLevel(*deviation))
     assert isinstance(poses, PoseResults)
     found = measure_recall(poses.folder, poses.description, poses.rows)
