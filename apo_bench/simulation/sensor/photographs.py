@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
-from apo_bench.geometry import Array, Ints, collect_corners, pose
+from apo_bench.geometry import Array
 from apo_bench.perception.depth_camera.range_finder import PinholeView
 from apo_bench.simulation.scene import KeptRenderer, Scene, aim_camera, build_data
 from apo_bench.simulation.sensor.rays import ModelRays
 
-_MARGIN_PX = 2
-"""Pixels around the projected corners of a part in which its silhouette is looked for."""
 _SHADOW_TEXELS = 2048  # along a side of the shadow map; each covers 0.8 mm on the table, a pixel at 0.9 m 1.1 mm
 _LIGHT_SPREAD = np.array([0.5, 0.5, 0.0])
 """Varied lights: largest change of their direction, relative to its vertical component."""
@@ -25,8 +23,6 @@ _BRIGHTNESS = 0.6, 1.3
 """Varied lights: range of their brightness, relative to the usual one."""
 _FIXED_COLOR = 0.1, 0.95
 """Varied colours: range of red, green and blue of the fixed parts."""
-_NEAREST_M = 1e-3
-"""Depth at which a part in front of the image plane begins."""
 
 Mask = NDArray[np.bool_]
 Box = tuple[int, int, int, int]
@@ -122,35 +118,15 @@ class Photographer:
 
     def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
         """The pixels that show a part alone."""
-        corners = pose.apply(T, collect_corners(self._scene.pieces[part])[0])
-        (left, top), (right, bottom) = _frame_points(view, corners)
-        v, u = np.mgrid[top:bottom, left:right]
-        _, index = self._cast({part: T}, view.origin, view.cast_through(u, v))
-        rows, columns = (each.ravel()[index == 0] for each in (v, u))
-        mask = np.zeros((view.height, view.width), dtype=np.bool_)
-        inside = (rows >= 0) & (rows < view.height) & (columns >= 0) & (columns < view.width)
-        mask[rows[inside], columns[inside]] = True
-        return Silhouette(mask, len(rows), find_box(rows, columns))
+        pixels = self._cast.find_pixels(part, T, view)
+        mask = np.isfinite(pixels.fill_image(view.height, view.width))
+        return Silhouette(mask, len(pixels.rows), find_box(pixels.rows, pixels.columns))
 
 
 def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
     """Give both eyes of MuJoCo's camera the exact upward direction of a view, which may be rolled."""
     for camera in scene.camera:
         camera.up = -view.T_world_view[:3, 1]
-
-
-def _frame_points(view: PinholeView, points: Array) -> Ints:
-    """The left upper and right lower pixel around points (k, 3), world, (2, 2), each column and row.
-
-    It ends one image beyond the image, or there if a point is behind the camera.
-    """
-    size = np.array([view.width, view.height])
-    local = pose.apply(pose.inverse(view.T_world_view), points)
-    if local[:, 2].min() < _NEAREST_M:
-        return np.array([-size, 2 * size])
-    pixels = local[:, :2] / local[:, 2:] * view.focal + size / 2
-    ends = np.floor(pixels.min(axis=0)) - _MARGIN_PX, np.ceil(pixels.max(axis=0)) + _MARGIN_PX
-    return np.clip(np.array(ends).astype(np.int64), -size, 2 * size)
 
 
 def find_box(rows: NDArray[Any], columns: NDArray[Any]) -> Box:
