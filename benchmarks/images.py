@@ -134,8 +134,8 @@ def write_page(rows: dict[float, list[dict[str, float | str]]], residuals: dict[
         "",
         "## Errors",
         "",
-        "Percentiles of the errors of upright estimates within 50 mm, next to those of photographs: MegaPose on T-LESS,",
-        "as the noise model `megapose-tless` draws them, fitted to 4980 published estimates in the test data of bop_toolkit.",
+        "Percentiles of the errors of upright estimates within 50 mm, next to those of MegaPose on photographs of",
+        "T-LESS (`megapose-tless`, fitted to 4980 published estimates in the test data of the BOP toolkit):",
         "",
         *table(
             ("`icp` / MegaPose on T-LESS", *(f"{p} %" for p in PERCENTILES)), list_errors(residuals[max(residuals)])

@@ -50,6 +50,9 @@ class ImageConfig(FileTable, frozen=True):
     depth_noise_mm: Annotated[
         _Size, Meta(description="Noise of a depth pixel at 1 m, in mm (1 sigma); grows with the squared depth.")
     ] = 1.0
+    detection_error_px: Annotated[
+        _Size, Meta(description="Error of position and size of the default detections, in pixels (1 sigma).")
+    ] = 0.0
     no_rgb: Annotated[bool, Meta(description="Write depth and masks only, which needs no graphics.")] = False
     randomise: Annotated[bool, Meta(description="Vary camera poses, lights and table colours by trial.")] = False
 

@@ -51,6 +51,7 @@ def write_scene(
         photographer.vary(rng)
     files: dict[str, dict[int, Any]] = {CAMERAS: {}, TRUTH: {}, VISIBILITY: {}}
     detections: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
     for image, operation, camera in number_images(len(moments), config.cameras):
         poses, view = moments[operation - 1], views[camera]
         photograph = photographer.take(view.true, poses)
@@ -62,14 +63,17 @@ def write_scene(
         files[TRUTH][image] = [_describe_pose(k, pose.inverse(view.true.T_world_view) @ T) for k, T in models]
         files[VISIBILITY][image] = facts
         seen = [
-            _make_detection((number, image, k), photograph.visible[part])
+            (k, photograph.visible[part])
             for (part, k), fact in zip(parts.items(), facts, strict=True)
             if fact["visib_fract"] >= LEAST_VISIBLE
         ]
-        detections += sorted(seen, key=lambda each: each["bbox"])  # an order that does not tell equal parts apart
+        seen.sort(key=lambda each: find_box(*np.nonzero(each[1])))  # an order that does not tell equal parts apart
+        annotations += [_make_detection((number, image, k), mask) for k, mask in seen]
+        detected = [(k, disturb_mask(mask, config.detection_error_px, rng)) for k, mask in seen]
+        detections += [_make_detection((number, image, k), mask) for k, mask in detected]
     written: dict[str, Any] = {CAMERAS: files[CAMERAS]} if is_secret else dict(files)
     if not is_secret:
-        written["scene_gt_coco.json"] = make_coco(detections, (config.width, config.height))
+        written["scene_gt_coco.json"] = make_coco(annotations, (config.width, config.height))
     for name, content in (*written.items(), (DETECTIONS, detections)):
         write_file(out / name, json.dumps(content))
 
@@ -87,6 +91,24 @@ def add_depth_noise(depth: Array, noise_mm: float, rng: np.random.Generator) -> 
     unit = rng.standard_normal(depth.shape) + BIAS * rng.standard_normal()
     lost = (rng.random(depth.shape) < _DROPOUTS) & (noise_mm > 0.0)
     return np.where(lost | ~np.isfinite(depth), 0.0, depth + sigma * unit)
+
+
+def disturb_mask(mask: Mask, error_px: float, rng: np.random.Generator) -> Mask:
+    """Move and scale a mask, (height, width), as an inexact detection; one that would leave the image is kept.
+
+    Args:
+        error_px: Standard deviation of its middle per axis, and of half its size, [pixels].
+    """
+    if not error_px:
+        return mask
+    from scipy.ndimage import affine_transform
+
+    where = np.argwhere(mask)
+    middle, half = (where.max(axis=0) + where.min(axis=0)) / 2, (np.ptp(where, axis=0) + 1) / 2
+    shift, growth = error_px * rng.standard_normal(2), error_px * rng.standard_normal()
+    scale = half / np.maximum(half + growth, 1.0)
+    found = affine_transform(mask, scale, middle - scale * (middle + shift), order=0)
+    return found if found.any() else mask
 
 
 def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path, is_secret: bool) -> None:
