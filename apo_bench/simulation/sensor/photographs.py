@@ -1,9 +1,9 @@
 """Photographs of parts: colours by rendering; depth and masks by ray casts, which need no graphics."""
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
 import mujoco
@@ -38,6 +38,21 @@ class Silhouette(NamedTuple):
     """How many there are, also outside the image."""
     box: Box
     """The box around them, which may reach beyond the image."""
+
+
+class PrintedMark(NamedTuple):
+    """A coloured rectangle on a part."""
+
+    T: Array
+    """(4, 4), frame of the part, [m]; its third axis points out of the surface."""
+    half: Array
+    """Half of its length, width and height, (3,), [m]."""
+    color: tuple[float, ...]
+    """Red, green and blue, from 0 to 1."""
+
+
+Marks = Mapping[str, Sequence[PrintedMark]]
+"""Part -> its marks."""
 
 
 class Photograph(NamedTuple):
@@ -85,8 +100,8 @@ class Photographer:
         is_fixed = self._world.geom_part >= len(self._world.free)
         model.geom_rgba[is_fixed, :3] = rng.uniform(*_FIXED_COLOR, 3)
 
-    def take(self, view: PinholeView, poses: Poses) -> Photograph:
-        """Take a photograph of parts at these poses, (4, 4), world, [m]; others are at their start."""
+    def take(self, view: PinholeView, poses: Poses, marks: Marks = MappingProxyType({})) -> Photograph:
+        """Take a photograph of parts with marks at these poses, (4, 4), world, [m]; others are at their start."""
         every = {**self._scene.scenario.start, **poses}
         shape = view.height, view.width
         distance, index = self._cast(every, view.origin, view.rays)
@@ -94,7 +109,7 @@ class Photographer:
         movable = self._scene.shown.free
         visible = {part: (index == names.index(part)).reshape(shape) for part in movable}
         return Photograph(
-            self._render(view, every),
+            self._render(view, every, marks),
             (distance * (view.rays @ view.T_world_view[:3, 2])).reshape(shape),
             visible,
             {part: self._silhouette(view, part, every[part]) for part in movable},
@@ -106,7 +121,7 @@ class Photographer:
             self._renderer.close()
             self._renderer = None
 
-    def _render(self, view: PinholeView, poses: Poses) -> NDArray[np.uint8] | None:
+    def _render(self, view: PinholeView, poses: Poses, marks: Marks) -> NDArray[np.uint8] | None:
         """Render the colours with a free camera, whose image is upright as that of `look_at`."""
         if self._renderer is None:
             return None
@@ -114,7 +129,14 @@ class Photographer:
         azimuth = np.degrees(np.arctan2(forward[1], forward[0]))
         elevation = np.degrees(np.arcsin(forward[2]))
         camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
-        return self._renderer.draw(build_data(self._world, self._scene, poses), camera, partial(_roll, view=view))
+        placed = [(poses[part] @ each.T, each) for part, several in marks.items() for each in several]
+
+        def adjust(scene: mujoco.MjvScene) -> None:
+            _roll(scene, view)
+            for T, mark in placed:
+                _add_mark(scene, T, mark)
+
+        return self._renderer.draw(build_data(self._world, self._scene, poses), camera, adjust)
 
     def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
         """The pixels that show a part alone."""
@@ -127,6 +149,15 @@ def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
     """Give both eyes of MuJoCo's camera the exact upward direction of a view, which may be rolled."""
     for camera in scene.camera:
         camera.up = -view.T_world_view[:3, 1]
+
+
+def _add_mark(scene: mujoco.MjvScene, T: Array, mark: PrintedMark) -> None:
+    """Add a mark at a pose, (4, 4), world, to MuJoCo's abstract scene, unless it is full."""
+    if scene.ngeom < scene.maxgeom:
+        rgba = np.array([*mark.color, 1.0], dtype=np.float32)
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        mujoco.mjv_initGeom(scene.geoms[scene.ngeom], box, mark.half, T[:3, 3], T[:3, :3].ravel(), rgba)
+        scene.ngeom += 1
 
 
 def find_box(rows: NDArray[Any], columns: NDArray[Any]) -> Box:

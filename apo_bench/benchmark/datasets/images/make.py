@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,21 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.benchmark.datasets.images.models import ImageObject, write_models
+from apo_bench.benchmark.datasets.images.printed_marks import draw_marks
 from apo_bench.benchmark.datasets.images.scene import DEPTH_SCALE, DETECTIONS, write_scene
 from apo_bench.benchmark.datasets.images.views import make_view, number_images
 from apo_bench.benchmark.sweeps.pool import make_process_pool
 from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
 from apo_bench.errors import require
 from apo_bench.formats.bop_images import DESCRIPTION, ImageConfig, ImageDescription, ImageEntry, SceneEntry
+from apo_bench.geometry import shrink_pieces
 from apo_bench.io import group_by, write_file
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.scenario.parts import read_part
+from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.scene.composing import movable_parts
-from apo_bench.simulation.sensor.photographs import Photographer
+from apo_bench.simulation.sensor.photographs import Marks, Photographer
 from apo_bench.trial.trial_stages import IMAGES, demonstration_of, scene_of, stream
 
 JOINED_DETECTIONS = "detections.json"
@@ -74,7 +77,7 @@ def make_images(
     objects = list_objects(trials, loaded)
     description = describe_images(trials, loaded, objects, config, split)
     _open_folder(out, description)
-    write_models({number: each for each, number in objects.items()}, out)
+    write_models({number: each for each, number in objects.items()}, out, config.marks)
     write_file(out / "camera.json", json.dumps(_describe_camera(config), indent=1))
     write_file(out / "README.md", _CARD.format(version=__version__, command=command))
     done = {int(path.parent.name) for path in (out / split).glob(f"*/{DETECTIONS}")}
@@ -174,6 +177,7 @@ def write_batch(batch: Batch, description: ImageDescription, folder: Path) -> li
     """Write scenes of one scenario; returns sentences about failed demonstrations."""
     scene = scene_of(batch[0][1])
     config = description.options
+    marks = print_marks(scene, description.scenes[str(batch[0][0])].parts) if config.marks else {}
     failed = []
     with closing(Photographer(scene, make_view(config, np.eye(4)), not config.no_rgb)) as photographer:
         for number, trial in batch:
@@ -182,8 +186,21 @@ def write_batch(batch: Batch, description: ImageDescription, folder: Path) -> li
                 failed.append(f"{trial.scenario}, seed {trial.seed}: the demonstration failed, so it has no images.")
                 continue
             rng = stream(trial.seed, IMAGES, trial.secret_seed)
-            write_scene(photographer, shown, number, description, rng, folder / f"{number:06d}")
+            write_scene(photographer, shown, number, description, rng, folder / f"{number:06d}", marks)
     return failed
+
+
+def print_marks(scene: Scene, parts: Mapping[str, int]) -> Marks:
+    """The marks of the parts of a scene, those of their models.
+
+    Args:
+        parts: Part -> number of its object.
+    """
+    solids, clearance_m = scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm
+    return {
+        part: draw_marks(shrink_pieces(solids[part], clearance_m), np.random.default_rng(number))
+        for part, number in parts.items()
+    }
 
 
 def _join_scenes(out: Path, split: str) -> int:

@@ -15,7 +15,7 @@ from apo_bench.formats.coco import encode_mask, make_coco
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_file
 from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
-from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photographer, Silhouette, find_box
+from apo_bench.simulation.sensor.photographs import Marks, Mask, Photograph, Photographer, Silhouette, find_box
 
 DETECTIONS = "scene_detections.json"
 """The detections of one scene, written last, so that a scene with this file is complete."""
@@ -32,6 +32,7 @@ def write_scene(
     description: ImageDescription,
     rng: np.random.Generator,
     out: Path,
+    marks: Marks,
 ) -> None:
     """Write the images of a demonstration; the true poses are left out if the trial is secret.
 
@@ -39,6 +40,7 @@ def write_scene(
         number: Of the scene.
         rng: Source of the cameras, their errors, and the noise of the depth images.
         out: Folder of the scene, made here.
+        marks: Those of the parts.
     """
     parts = description.scenes[str(number)].parts
     config = description.options
@@ -54,7 +56,7 @@ def write_scene(
     annotations: list[dict[str, Any]] = []
     for image, operation, camera in number_images(len(moments), config.cameras):
         poses, view = moments[operation - 1], views[camera]
-        photograph = photographer.take(view.true, poses)
+        photograph = photographer.take(view.true, poses, marks)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
         models = [(k, poses[part] @ description.offset(k)) for part, k in parts.items()]
