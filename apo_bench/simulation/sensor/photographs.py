@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
@@ -130,12 +131,7 @@ class Photographer:
         elevation = np.degrees(np.arcsin(forward[2]))
         camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
         placed = [(poses[part] @ each.T, each) for part, several in marks.items() for each in several]
-
-        def adjust(scene: mujoco.MjvScene) -> None:
-            _roll(scene, view)
-            for T, mark in placed:
-                _add_mark(scene, T, mark)
-
+        adjust = partial(_adjust_scene, upward=-view.T_world_view[:3, 1], marks=placed)
         return self._renderer.draw(build_data(self._world, self._scene, poses), camera, adjust)
 
     def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
@@ -145,18 +141,18 @@ class Photographer:
         return Silhouette(mask, len(pixels.rows), find_box(pixels.rows, pixels.columns))
 
 
-def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
-    """Give both eyes of MuJoCo's camera the exact upward direction of a view, which may be rolled."""
-    for camera in scene.camera:
-        camera.up = -view.T_world_view[:3, 1]
+def _adjust_scene(scene: mujoco.MjvScene, upward: Array, marks: Sequence[tuple[Array, PrintedMark]]) -> None:
+    """Give MuJoCo's abstract scene the exact upward direction of a view, which may be rolled, and marks.
 
-
-def _add_mark(scene: mujoco.MjvScene, T: Array, mark: PrintedMark) -> None:
-    """Add a mark at a pose, (4, 4), world, to MuJoCo's abstract scene, unless it is full."""
-    if scene.ngeom < scene.maxgeom:
+    Args:
+        marks: Poses, (4, 4), world, and marks; those for which the scene has no room are left out.
+    """
+    for camera in scene.camera:  # both eyes
+        camera.up = upward
+    for T, mark in marks[: scene.maxgeom - scene.ngeom]:
         rgba = np.array([*mark.color, 1.0], dtype=np.float32)
-        box = mujoco.mjtGeom.mjGEOM_BOX
-        mujoco.mjv_initGeom(scene.geoms[scene.ngeom], box, mark.half, T[:3, 3], T[:3, :3].ravel(), rgba)
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, mark.half, T[:3, 3], T[:3, :3].ravel(), rgba)
         scene.ngeom += 1
 
 
