@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.benchmark.datasets.images.printed_marks import draw_marks
+from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks
 from apo_bench.formats.bop_images import MODELS_INFO
 from apo_bench.geometry import (
     Array,
@@ -117,11 +117,11 @@ def make_info_entry(each: ImageObject, vertices: Array) -> dict[str, Any]:
     return entry
 
 
-def write_models(objects: Mapping[int, ImageObject], out: Path, with_marks: bool) -> None:
+def write_models(objects: Mapping[int, ImageObject], marks: ObjectMarks, out: Path) -> None:
     """Write the folders `models`, and `models_eval` with finer meshes, and their `models_info.json`.
 
     Args:
-        with_marks: Whether the meshes in `models` have marks. Symmetries are those of the shapes.
+        marks: Those of the meshes in `models`. Symmetries are those of the shapes.
     """
     described = {}
     for folder in _FOLDERS:
@@ -131,9 +131,7 @@ def write_models(objects: Mapping[int, ImageObject], out: Path, with_marks: bool
         described[str(number)] = make_info_entry(each, mesh.vertices)
         fine = mesh.subdivide_to_size(_FINEST * described[str(number)]["diameter"])
         fine.merge_vertices(merge_norm=True)  # so that each counts once in a mean
-        shown = (
-            add_marks(mesh, draw_marks(each.pieces, np.random.default_rng(number)), each.offset) if with_marks else mesh
-        )
+        shown = add_marks(mesh, marks.get(number, ()), each.offset)
         for folder, form in zip(_FOLDERS, (shown, fine), strict=True):
             content = form.export(file_type="ply", vertex_normal=True)
             write_file(out / folder / f"obj_{number:06d}.ply", content)

@@ -1,5 +1,7 @@
 """Draw coloured marks on the surfaces of parts, so that a pose estimator can tell their faces apart."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from apo_bench.geometry import Array, Piece, build_union_mesh, measure_depth_inside, pose
@@ -11,6 +13,9 @@ _EXPONENTS = -2.0, -1.0
 """Powers of 10 of half the length and half the width of a mark, relative to the diagonal of the part."""
 _HEIGHT_M = 5e-5  # of a mark above the surface; later marks cover earlier ones
 _SIDES = np.array([(0.0, 0.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)])
+
+ObjectMarks = Mapping[int, Sequence[PrintedMark]]
+"""Number of an object -> its marks."""
 
 
 def draw_marks(pieces: tuple[Piece, ...], rng: np.random.Generator) -> tuple[PrintedMark, ...]:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Demonstration, compute_placements
+from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks
 from apo_bench.benchmark.datasets.images.views import draw_views, number_images
 from apo_bench.formats.bop_images import CAMERAS, LEAST_VISIBLE, TRUTH, VISIBILITY, ImageDescription
 from apo_bench.formats.coco import encode_mask, make_coco
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_file
 from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
-from apo_bench.simulation.sensor.photographs import Marks, Mask, Photograph, Photographer, Silhouette, find_box
+from apo_bench.simulation.sensor.photographs import Mask, Photograph, Photographer, Silhouette, find_box
 
 DETECTIONS = "scene_detections.json"
 """The detections of one scene, written last, so that a scene with this file is complete."""
@@ -31,8 +32,8 @@ def write_scene(
     number: int,
     description: ImageDescription,
     rng: np.random.Generator,
+    marks: ObjectMarks,
     out: Path,
-    marks: Marks,
 ) -> None:
     """Write the images of a demonstration; the true poses are left out if the trial is secret.
 
@@ -40,7 +41,6 @@ def write_scene(
         number: Of the scene.
         rng: Source of the cameras, their errors, and the noise of the depth images.
         out: Folder of the scene, made here.
-        marks: Those of the parts.
     """
     parts = description.scenes[str(number)].parts
     config = description.options
@@ -49,6 +49,7 @@ def write_scene(
         (out / folder).mkdir(parents=True, exist_ok=True)
     moments = compute_placements(demonstration.assembly, demonstration.start, demonstration.poses)
     views = draw_views(config, rng)
+    of_parts = {part: marks.get(k, ()) for part, k in parts.items()}
     if config.randomise:
         photographer.vary(rng)
     files: dict[str, dict[int, Any]] = {CAMERAS: {}, TRUTH: {}, VISIBILITY: {}}
@@ -56,7 +57,7 @@ def write_scene(
     annotations: list[dict[str, Any]] = []
     for image, operation, camera in number_images(len(moments), config.cameras):
         poses, view = moments[operation - 1], views[camera]
-        photograph = photographer.take(view.true, poses, marks)
+        photograph = photographer.take(view.true, poses, of_parts)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
         models = [(k, poses[part] @ description.offset(k)) for part, k in parts.items()]
