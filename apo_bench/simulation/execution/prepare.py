@@ -46,6 +46,8 @@ _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the
 _FIRM_N = 80.0
 """Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
 an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
+_ROOM_MM = 0.2
+"""Least clearance with which it does so: at that speed the tip is up to 0.3 mm off its line."""
 _SEAT_N = 2.0  # least force limit of a motion that ends on the seat of a part that is clamped to a fixed one
 _CARRIES = 0.1
 """A face carries weight if the vertical component of its normal is at least this."""
@@ -163,8 +165,9 @@ def _transfer(
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     ways = list_entrance_distances(assembly, comes, after, into.direction)
-    # A hand that does not hold firmly is slow from the first entrance on.
-    first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
+    # A hand that does not hold firmly, or has little room, is slow from the first entrance on.
+    quick = holds_firmly(scene.arm) and scene.clearance_mm >= _ROOM_MM
+    first = 0.0 if quick else max(ways, default=0.0)
     clamps = list_clamps(scene.scenario)
     clamps_to = clamps.get(part, "") if operation.clamped and not undo else ""
     loose = [p for p in list_neighbours(contacts, operation.moves) if p in weight and p not in clamps]
