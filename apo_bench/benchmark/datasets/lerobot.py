@@ -112,7 +112,7 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
     of_episodes = {**_OF_EPISODE, **about.episodes}
-    tables = {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes}
+    tables: dict[str, Mapping[str, Any]] = {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes}
     if videos.features:
         tables["videos/*/*/*.mp4"] = dict.fromkeys(videos.features, "image of each frame")
     write_card(about, out, counted, tables)

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.datasets.images.depth_images import make_model_rays, read_distances
 from apo_bench.benchmark.scoring.visible_surface import TOLERANCES, DepthView, compute_discrepancies
 from apo_bench.formats.bop import PoseRows
 from apo_bench.formats.bop_images import LEAST_VISIBLE, MODELS_INFO, TRUTH, VISIBILITY, ImageDescription, read_cameras
 from apo_bench.formats.bop_models import ObjectSymmetry, read_symmetries
 from apo_bench.geometry import Array, pose
 from apo_bench.io import group_by, read_plain
+from apo_bench.simulation.sensor.depth_images import make_model_rays, read_distances
 from apo_bench.simulation.sensor.rays import ModelRays
 
 _SHARES = np.arange(1, 11) * 0.05
@@ -116,8 +116,8 @@ def measure_recall(folder: Path, description: ImageDescription, rows: PoseRows) 
 def _list_errors(target: _Target, model: EvaluatedModel, description: ImageDescription) -> Array:
     """The errors of each pair of a true pose and an estimate, (k, j, 13), in the order of `_THRESHOLDS`."""
     to_part = pose.inverse(description.offset(target.number))
-    of_parts = [pose.rigid(T[:, :3, :3], 1e-3 * T[:, :3, 3]) @ to_part for T in (target.true, target.estimated)]
-    hidden = compute_discrepancies(target.image, target.number, *of_parts, 1e-3 * model.diameter_mm)
+    true, estimated = (pose.rigid(T[:, :3, :3], 1e-3 * T[:, :3, 3]) @ to_part for T in (target.true, target.estimated))
+    hidden = compute_discrepancies(target.image, target.number, true, estimated, 1e-3 * model.diameter_mm)
     errors = compute_errors(target.true, target.estimated, model, target.K)
     errors[..., 1] *= _WIDTH_PX / description.options.width
     return np.concatenate([hidden, errors], axis=2)

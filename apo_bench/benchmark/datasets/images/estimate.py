@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.datasets.images.depth_images import load_solids, make_model_rays, read_distances
 from apo_bench.benchmark.datasets.images.make import JOINED_DETECTIONS
 from apo_bench.errors import require
 from apo_bench.formats.bop import EstimatedPose, write_results
@@ -23,6 +22,7 @@ from apo_bench.io import group_by, read_plain
 from apo_bench.perception.depth_camera.model_localisation import Appearance, Model, locate_model
 from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
 from apo_bench.perception.depth_camera.surface import load_small_gicp, sample_surface
+from apo_bench.simulation.sensor.depth_images import load_solids, make_model_rays, read_distances
 from apo_bench.simulation.sensor.rays import ModelRays
 
 _LARGEST_BYTES = 1_000_000_000
