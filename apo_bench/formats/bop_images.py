@@ -53,6 +53,10 @@ class ImageConfig(FileTable, frozen=True):
     detection_error_px: Annotated[
         _Size, Meta(description="Error of position and size of the default detections, in pixels (1 sigma).")
     ] = 0.0
+    video_hz: Annotated[
+        float,
+        Meta(ge=0.0, le=50.0, description="Images between operations for each second, to track parts; 0: none."),
+    ] = 0.0
     marks: Annotated[bool, Meta(description="Print coloured marks on the parts, so that their faces differ.")] = False
     no_rgb: Annotated[bool, Meta(description="Write depth and masks only, which needs no graphics.")] = False
     randomise: Annotated[bool, Meta(description="Vary camera poses, lights and table colours by trial.")] = False

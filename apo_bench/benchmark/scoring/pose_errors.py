@@ -147,15 +147,17 @@ def _list_targets(
         return
     truth = json.loads((place / TRUTH).read_text(encoding="utf-8"))
     facts = json.loads((place / VISIBILITY).read_text(encoding="utf-8"))
-    for image, camera in read_cameras(place).items():
-        view = DepthView(*read_distances(place / "depth" / f"{image:06d}.png", camera), cast)
-        pairs = zip(truth[str(image)], facts[str(image)], strict=True)
+    cameras = read_cameras(place)
+    for name in description.scenes[str(scene)].images:
+        image = int(name)
+        view = DepthView(*read_distances(place / "depth" / f"{image:06d}.png", cameras[image]), cast)
+        pairs = zip(truth[name], facts[name], strict=True)
         visible = ((entry["obj_id"], entry) for entry, fact in pairs if fact["visib_fract"] >= LEAST_VISIBLE)
         for number, entries in group_by(visible).items():
             T = pose.rigid([np.reshape(e["cam_R_m2c"], (3, 3)) for e in entries], [e["cam_t_m2c"] for e in entries])
             found = np.flatnonzero((rows.where == (scene, image, number)).all(axis=1))
             best = found[np.argsort(-rows.score[found], kind="stable")[: len(entries)]]
-            yield _Target(number, T, pose.rigid(rows.R[best], rows.t_mm[best]), camera.K, view)
+            yield _Target(number, T, pose.rigid(rows.R[best], rows.t_mm[best]), cameras[image].K, view)
 
 
 def compute_errors(truth: Array, seen: Array, model: EvaluatedModel, K: Array) -> Array:

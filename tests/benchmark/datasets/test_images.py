@@ -18,6 +18,7 @@ from apo_bench.benchmark.datasets.images.estimate import estimate_images
 from apo_bench.benchmark.datasets.images.models import ImageObject, make_info_entry, make_model, measure_diameter
 from apo_bench.benchmark.datasets.images.scene import add_depth_noise, disturb_mask
 from apo_bench.benchmark.datasets.images.views import draw_views
+from apo_bench.benchmark.scoring.pose_errors import measure_recall
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_image_description
 from apo_bench.formats.bop_models import read_symmetries
@@ -25,7 +26,7 @@ from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import collect_corners, pose, shrink_pieces
 from apo_bench.io import convert_typed
 from apo_bench.records import SecretSeed
-from tests.image_sets import SMALL, list_truth, make
+from tests.image_sets import SMALL, list_truth, make, write_truth
 
 
 @pytest.fixture(scope="module")
@@ -246,6 +247,28 @@ def test_annotations_are_exact_where_detections_are_not(tmp_path: Path) -> None:
     assert read(images / "detections.json") != read(exact / "detections.json")
     for name in ("test/000001/scene_gt_coco.json", "test_targets_bop19.json"):
         assert read(images / name) == read(exact / name)
+
+
+def test_images_between_operations_are_numbered_by_operation_and_are_no_targets(tmp_path: Path) -> None:
+    images = make(tmp_path / "set", "block_on_block", config=replace(SMALL, video_hz=4.0))
+    still = make(tmp_path / "still", "block_on_block")
+    for name in ("detections.json", "test_targets_bop19.json", "test/000001/scene_gt_coco.json"):
+        assert read(images / name) == read(still / name)
+    truth = read(images / "test" / "000001" / "scene_gt.json")
+    assert {path.stem for path in (images / "test" / "000001" / "depth").iterdir()} == {f"{int(k):06d}" for k in truth}
+    for operation in (1, 2):
+        frames = [int(image) for image in truth if int(image) // 10000 == operation]
+        assert frames == [*range(10000 * operation + 1, 10000 * operation + len(frames) + 1)]
+        assert len(frames) > 5
+        shifts = np.array([[entry["cam_t_m2c"] for entry in truth[str(k)]] for k in frames])
+        end = np.array([entry["cam_t_m2c"] for entry in truth[str(operation)]])
+        # one part moved, and the last frame is where the image of the operation shows it, to what parts settle by
+        assert (np.ptp(shifts, axis=0).max(axis=1) > 20.0).sum() == 1
+        assert shifts[-1] == pytest.approx(end, abs=0.5)
+    recalls = [
+        measure_recall(each, read_image_description(each), read_results(write_truth(each))) for each in (images, still)
+    ]
+    assert recalls[0] == recalls[1]
 
 
 def test_the_estimator_finds_parts_in_exact_depth(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from apo_bench import __version__
 from apo_bench.benchmark.datasets.images.models import ImageObject, write_models
 from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks, draw_marks
 from apo_bench.benchmark.datasets.images.scene import DEPTH_SCALE, DETECTIONS, write_scene
+from apo_bench.benchmark.datasets.images.video_frames import record_frames
 from apo_bench.benchmark.datasets.images.views import make_view, number_images
 from apo_bench.benchmark.sweeps.pool import make_process_pool
 from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
@@ -179,12 +180,14 @@ def write_batch(batch: Batch, description: ImageDescription, marks: ObjectMarks,
     failed = []
     with closing(Photographer(scene, make_view(config, np.eye(4)), not config.no_rgb)) as photographer:
         for number, trial in batch:
-            shown = demonstration_of(trial, scene).demonstration
+            simulated = demonstration_of(trial, scene)
+            shown = simulated.demonstration
             if shown.code != "ok":
                 failed.append(f"{trial.scenario}, seed {trial.seed}: the demonstration failed, so it has no images.")
                 continue
+            frames = record_frames(scene, trial, simulated, config.video_hz) if config.video_hz else {}
             rng = stream(trial.seed, IMAGES, trial.secret_seed)
-            write_scene(photographer, shown, number, description, rng, marks, folder / f"{number:06d}")
+            write_scene(photographer, shown, number, description, rng, marks, frames, folder / f"{number:06d}")
     return failed
 
 

@@ -2,13 +2,14 @@
 
 import json
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Demonstration, compute_placements
+from apo_bench.assembly import Demonstration, Poses, compute_placements
 from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks
 from apo_bench.benchmark.datasets.images.views import draw_views, number_images
 from apo_bench.formats.bop_images import CAMERAS, LEAST_VISIBLE, TRUTH, VISIBILITY, ImageDescription
@@ -33,6 +34,7 @@ def write_scene(
     description: ImageDescription,
     rng: np.random.Generator,
     marks: ObjectMarks,
+    frames: Mapping[int, Poses],
     out: Path,
 ) -> None:
     """Write the images of a demonstration; the true poses are left out if the trial is secret.
@@ -40,6 +42,7 @@ def write_scene(
     Args:
         number: Of the scene.
         rng: Source of the cameras, their errors, and the noise of the depth images.
+        frames: Number of each further image of the first camera -> poses of the parts; without detections.
         out: Folder of the scene, made here.
     """
     parts = description.scenes[str(number)].parts
@@ -55,8 +58,11 @@ def write_scene(
     files: dict[str, dict[int, Any]] = {CAMERAS: {}, TRUTH: {}, VISIBILITY: {}}
     detections: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
-    for image, operation, camera in number_images(len(moments), config.cameras):
-        poses, view = moments[operation - 1], views[camera]
+    shots = [
+        *((image, moments[k - 1], views[camera]) for image, k, camera in number_images(len(moments), config.cameras)),
+        *((image, poses, views[0]) for image, poses in frames.items()),
+    ]
+    for image, poses, view in shots:
         photograph = photographer.take(view.true, poses, of_parts)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
@@ -65,6 +71,8 @@ def write_scene(
         files[CAMERAS][image] = _describe_camera(view.published)
         files[TRUTH][image] = [_describe_pose(k, pose.inverse(view.true.T_world_view) @ T) for k, T in models]
         files[VISIBILITY][image] = facts
+        if image in frames:
+            continue
         seen = [
             (k, photograph.visible[part])
             for (part, k), fact in zip(parts.items(), facts, strict=True)
