@@ -163,7 +163,7 @@ _Found = list[tuple[str, RawSolid]]
 def _read_solids(files: Sequence[Path], unit: str | None, lines: _Report) -> Iterator[tuple[str, RawSolid]]:
     """Yield the solids of the files; those that cannot be read are reported."""
     for file in files:
-        source, solids = read_raw_solids(file, unit, lenient=True)
+        source, solids = read_raw_solids(file, unit, lenient=True, is_component=len(files) > 1)
         for warning in (*source.warnings, *(f"left out: {reason}" for reason in source.left_out)):
             lines.add(f"{file.name}: {warning}")
         yield from ((file.name, raw) for raw in solids)

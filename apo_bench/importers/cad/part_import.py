@@ -1,6 +1,5 @@
 """Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
 
-import os
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays, me
 from apo_bench.importers.cad.contact_faces import make_contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
+from apo_bench.importers.cad.joined_solids import join_near_solids, number_solids
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.importers.cad.meshes.shells import split_into_solids
 from apo_bench.importers.cad.moments import compute_piece_moments, compute_solid_moments
@@ -63,7 +63,7 @@ class ImportedPart:
 
 
 def read_raw_solids(
-    path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES, lenient: bool = False
+    path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES, lenient: bool = False, is_component: bool = False
 ) -> tuple[CadFile, list[RawSolid]]:
     """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
 
@@ -71,6 +71,8 @@ def read_raw_solids(
         unit: Unit of a mesh file; None: as stated or guessed.
         fewest_sides: Smallest number of facets of a round face around a full turn in a mesh.
         lenient: Whether the convex hull stands for a solid whose surface is open or crosses itself.
+        is_component: Whether solids of a mesh that lie next to each other are one part. In STEP files of several
+            components they always are.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
@@ -78,7 +80,8 @@ def read_raw_solids(
     if path.suffix.lower() in STEP_SUFFIXES:
         return read_step(path, unit, lenient)
     file, meshes = read_meshes(path, unit)
-    solids = merge_copies(raw for name, mesh in meshes for raw in _split_mesh(path, name, mesh, lenient))
+    join = join_near_solids if is_component else number_solids
+    solids = merge_copies(raw for name, mesh in meshes for raw in join(_split_mesh(path, name, mesh, lenient)))
     return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
 
 
@@ -143,8 +146,9 @@ def import_solid(
             path.unlink()
             path.with_suffix(".toml").unlink(missing_ok=True)
     else:  # no moments gave a part that could be read
-        why = str(fault).replace(f"{path.parent}{os.sep}", "").split("; ")[0].rstrip(".")
-        raise InputError(f"{source}: its convex pieces make no part ({why}); leave out fillets.") from fault
+        raise InputError(
+            f"{source}: no shape for collisions agrees with the solid; leave out fillets and small details."
+        ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
 
@@ -191,9 +195,7 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
     """
     corners = sum(len(piece.corners) for piece in pieces.pieces)
     most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
-    require(
-        corners <= MOST_CORNERS_IN_ALL, f"{source}: the convex pieces of the part have {corners:,} corners; {most}."
-    )
+    require(corners <= MOST_CORNERS_IN_ALL, f"{source}: the shape for collisions has {corners:,} corners; {most}.")
     moments = compute_solid_moments(raw, pieces)
     own = compute_piece_moments(pieces.pieces)
     if pieces.coarse:
@@ -202,8 +204,8 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
         filled = 1e9 * own.size
         require(
             abs(filled - raw.mesh.volume) <= _SLIVERS * raw.mesh.volume,
-            f"{source}: the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3; "
-            "its surface may cross itself, so repair it in its CAD program.",
+            f"{source}: the solid has {raw.mesh.volume:.6g} mm^3, its shape for collisions {filled:.6g} mm^3; its "
+            "surface may cross itself, so repair it in its CAD program.",
         )
     return [moments, own] if abs(own.size - moments.size) < _SLIVERS * own.size else [moments]
 

@@ -1,14 +1,16 @@
 """Cut a solid into convex pieces: along planes of reflex edges, then around round holes, [mm]."""
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import manifold3d
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Hull
+from apo_bench.importers.cad.joined_solids import split_solid
 from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
@@ -53,6 +55,23 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
+    cuts = [_cut_connected(each, others, coarse) for each in split_solid(raw)]
+    pieces, filled = (tuple(chain.from_iterable(each[k] for each in cuts)) for k in (0, 2))
+    _check_count(len(pieces))
+    return CutSolid(pieces, sum(each.hulls for each in cuts), filled, coarse)
+
+
+def _check_count(pieces: int) -> None:
+    """Raise InputError if a part needs more pieces than it may have."""
+    require(
+        pieces <= MOST_PIECES,
+        f"the shape for collisions needs more than {MOST_PIECES:,} convex blocks, which are the most; leave out "
+        "fillets and free surfaces.",
+    )
+
+
+def _cut_connected(raw: RawSolid, others: Array | None, coarse: bool) -> CutSolid:
+    """Cut a connected solid into convex pieces."""
     body = convert_to_manifold(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
@@ -91,11 +110,8 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
         # Fill at least a quarter of the holes, the least important ones.
         kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // count_least_pieces(kept)))]
         pieces = _bore_holes(outlines, kept, flats)
-    if pieces is None:
-        raise InputError(
-            f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
-            "out fillets and free surfaces."
-        )
+    _check_count(MOST_PIECES + 1 if pieces is None else len(pieces))
+    assert pieces is not None
     crumb = (_COARSE_CRUMB if coarse else _CRUMB) * raw.mesh.volume
     whole, lost = _drop_crumbs(list(convert_to_cylinders(pieces, shafts)), crumb)
     return CutSolid(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept), coarse)
