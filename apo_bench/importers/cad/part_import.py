@@ -137,7 +137,8 @@ def import_solid(
     title = clean_title(raw.name) if raw.name != name else ""
     stated |= {"density": density, "source": source, "title": title, "licence": "as that file"}
     for moments in possible_moments:
-        path = write_part(name, replace(body, moments=moments), folder, **stated)
+        # Of boxes that stand for more detailed shapes, the faces are not those of their union.
+        path = write_part(name, replace(body, moments=moments), folder, by_sites=others is None, **stated)
         try:
             solid = load_part(path)
             break
@@ -196,9 +197,8 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
     corners = sum(len(piece.corners) for piece in pieces.pieces)
     most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
     require(corners <= MOST_CORNERS_IN_ALL, f"{source}: the shape for collisions has {corners:,} corners; {most}.")
-    moments = compute_solid_moments(raw, pieces)
     own = compute_piece_moments(pieces.pieces)
-    if pieces.coarse:
+    if pieces.coarse or pieces.hulls or pieces.filled:
         return [own]
     if all(region.kind == "plane" for region in raw.regions):
         filled = 1e9 * own.size
@@ -207,6 +207,7 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
             f"{source}: the solid has {raw.mesh.volume:.6g} mm^3, its shape for collisions {filled:.6g} mm^3; its "
             "surface may cross itself, so repair it in its CAD program.",
         )
+    moments = compute_solid_moments(raw)
     return [moments, own] if abs(own.size - moments.size) < _SLIVERS * own.size else [moments]
 
 

@@ -45,8 +45,14 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
 def group_touching_pieces(pieces: Sequence[Piece], gap_m: float = _TOUCHING_M) -> list[set[int]]:
     """Group the indices of pieces with smaller gaps between them, directly or through other pieces."""
     from scipy.cluster.hierarchy import DisjointSet
+    from scipy.spatial import cKDTree
 
     solids = DisjointSet(range(len(pieces)))
+    # Most neighbours share corners, which is quick to see.
+    owner = np.repeat(np.arange(len(pieces)), [len(piece.corners) for piece in pieces])
+    shared = cKDTree(np.concatenate([piece.corners for piece in pieces])).query_pairs(gap_m, output_type="ndarray")
+    for i, k in np.unique(owner[shared], axis=0).tolist():
+        solids.merge(i, k)
     low = np.array([piece.center - piece.half for piece in pieces]) - gap_m
     high = np.array([piece.center + piece.half for piece in pieces]) + gap_m
     # Only pairs whose bounding boxes meet are tested.

@@ -27,7 +27,7 @@ def test_a_bump_inside_a_wall_is_cut_off_with_the_clearance_and_the_scenario_sta
     poses, lines, notes = import_parts(files, tmp_path / "parts", "mm")
     assert set(notes) <= set(lines)
     (line,) = (note for note in notes if "no whole face explains it" in note)
-    assert line.startswith("'stand' and 'lug' were drawn 0.3 mm inside each other")
+    assert line.startswith("'stand' and 'lug' are 0.3 mm inside each other as drawn")
     assert "mm^3 of 'lug' are taken off, which leaves 0.25 mm of play" in line
     stand, lug = read_posed(poses)
     shifted = lug.T @ pose.at((-2.4e-4, 0, 1e-6))

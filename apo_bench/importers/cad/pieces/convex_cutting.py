@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Hull
 from apo_bench.importers.cad.joined_solids import split_solid
-from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts
+from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts, list_near_flats
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
 from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace
@@ -23,7 +23,7 @@ from apo_bench.scenario.parts.mass_checks import group_touching_pieces
 
 _MOST_TRIANGLES = 20_000  # a body with more is simplified first
 _ENTRANCE_MM = 1.0  # a solid nearer to the ends of a hole than this is at its entrance
-_WEDGES = 300
+_WEDGES = 100
 """In an assembly, unused holes are filled if all holes would need more wedges than this."""
 _CRUMB = 1e-3
 """Groups of pieces that touch no others are dropped if they are below this share of the volume of the solid."""
@@ -86,8 +86,9 @@ def _cut_connected(raw: RawSolid, others: Array | None, coarse: bool) -> CutSoli
         body = body.simplify(min(1e-3 * size, 0.01))
     hulls = 0
     outlines: list[Array] = []
-    beside = HollowSpace(size, flats, None if others is None else cKDTree(others))
-    parts = cut_into_coarse_parts(body, raw, beside) if coarse else cut_into_convex_parts(body, beside)
+    tree = None if others is None else cKDTree(others)
+    beside = HollowSpace(size, list_near_flats(raw, tree), tree)
+    parts = cut_into_coarse_parts(body, beside) if coarse else cut_into_convex_parts(body, beside)
     for part in cut_at_shoulders(parts, shafts, size):
         rough = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
         if len(rough) < 4 or not is_thick(rough):
