@@ -1,5 +1,6 @@
 """Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
 
+import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,6 +42,8 @@ _NEARLY_ALL = 0.98
 """The share of a flat face that must lie on pieces otherwise."""
 _SLIVERS = 0.01
 """Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
+_FACE_AT_FAULT = re.compile(r", faces, (\w+):")
+"""The face in the message of a part file that cannot be read."""
 # Why a filled hole can make no contact.
 _FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
@@ -136,22 +139,46 @@ def import_solid(
     stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
     title = clean_title(raw.name) if raw.name != name else ""
     stated |= {"density": density, "source": source, "title": title, "licence": "as that file"}
+    # Of boxes that stand for more detailed shapes, the faces are not those of their union.
+    stated["by_sites"] = others is None
     for moments in possible_moments:
-        # Of boxes that stand for more detailed shapes, the faces are not those of their union.
-        path = write_part(name, replace(body, moments=moments), folder, by_sites=others is None, **stated)
         try:
-            solid = load_part(path)
+            path, solid = _write_checked(name, replace(body, moments=moments), folder, stated, refused)
             break
         except InputError as error:
             fault = error
-            path.unlink()
-            path.with_suffix(".toml").unlink(missing_ok=True)
     else:  # no moments gave a part that could be read
         raise InputError(
             f"{source}: no shape for collisions agrees with the solid; leave out fillets and small details."
         ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
+
+
+def _write_checked(
+    name: str, body: Body, folder: Path, stated: Mapping[str, Any], refused: dict[str, str]
+) -> tuple[Path, Solid]:
+    """Write a part and read it back, without the faces that do not agree with its pieces.
+
+    Args:
+        stated: Further arguments of `write_part`.
+        refused: Gets the omitted faces with the reason.
+
+    Raises:
+        InputError: The part cannot be read back.
+    """
+    while True:
+        path = write_part(name, body, folder, **stated)
+        try:
+            return path, load_part(path)
+        except InputError as error:
+            path.unlink()
+            path.with_suffix(".toml").unlink(missing_ok=True)
+            face = _FACE_AT_FAULT.search(str(error))
+            if face is None or face[1] in refused:
+                raise
+            refused[face[1]] = str(error).split(": ", 1)[-1].split("; ")[0]
+            body = _remove_faces(body, {face[1]})
 
 
 def _choose_density(source: str, volume: float, density: float) -> tuple[float, tuple[str, ...]]:

@@ -60,14 +60,15 @@ def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDesc
     _put(model, data, fingers, 0.0)
     T_tip = pose.inverse(body_frame(data, body)) @ _find_tip(model, data, fingers, closing, ahead)
     one, other = fingers
-    _couple(spec, *(model.joint(f.joint).name for f in fingers), states)
+    joints = (model.joint(one.joint).name, model.joint(other.joint).name)
+    _couple(spec, *joints, states)
     force = min(_FORCE_N, *(_limit_force(model, f.joint) / 2.0 for f in fingers))
-    _add_drive(spec, model.joint(one.joint).name, force)
+    _add_drive(spec, joints[0], force)
     # The first row commands the closed fingers into the part.
     beyond = states[0, 0] - np.sign(one.open - one.closed) * _SQUEEZE_M
     hand = Hand(
         actuators=(_DRIVE,),
-        joints=tuple(model.joint(f.joint).name for f in fingers),
+        joints=joints,
         opening=np.array([gaps[0] - 1e-3, *gaps]) / 2.0,
         commands=np.array([beyond, *states[:, 0]])[:, None],
         states=np.array([states[0], *states]),
@@ -113,7 +114,7 @@ def _find_fingers(
     ahead = way / np.linalg.norm(way)
     fingers = []
     for j, own, sign in zip(slides, geoms, signs, strict=True):
-        closed, widest = sorted(model.jnt_range[j].tolist(), key=lambda q, sign=sign: sign * q)
+        closed, widest = model.jnt_range[j][:: int(sign)].tolist()
         fingers.append(_Finger(j, max(own, key=lambda g: geom_reach(model, data, g, ahead)), closed, widest))
     return closing, ahead, (fingers[0], fingers[1])
 

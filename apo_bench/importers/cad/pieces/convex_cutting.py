@@ -22,7 +22,7 @@ from apo_bench.scenario.parts.limits import MOST_PIECES
 from apo_bench.scenario.parts.mass_checks import group_touching_pieces
 
 _MOST_TRIANGLES = 20_000  # a body with more is simplified first
-_ENTRANCE_MM = 1.0  # a solid nearer to the ends of a hole than this is at its entrance
+_INSIDE_MM = 0.05  # a solid deeper in a hole than this comes into it, and does not only cover it
 _WEDGES = 100
 """In an assembly, unused holes are filled if all holes would need more wedges than this."""
 _CRUMB = 1e-3
@@ -56,7 +56,8 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
     cuts = [_cut_connected(each, others, coarse) for each in split_solid(raw)]
-    pieces, filled = (tuple(chain.from_iterable(each[k] for each in cuts)) for k in (0, 2))
+    pieces = tuple(chain.from_iterable(each.pieces for each in cuts))
+    filled = tuple(chain.from_iterable(each.filled for each in cuts))
     _check_count(len(pieces))
     return CutSolid(pieces, sum(each.hulls for each in cuts), filled, coarse)
 
@@ -101,10 +102,12 @@ def _cut_connected(raw: RawSolid, others: Array | None, coarse: bool) -> CutSoli
         hulls += abs(rough_volume - true + kept_volume - fine_volume) > _LOSS * true
         outlines.append(corners)
     # Most important holes first: those that other solids come near, then the widest.
-    kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
+    used = [_is_used(bore, others) for bore in bores]
+    order = sorted(range(len(bores)), key=lambda k: (used[k], max(bores[k].radii)), reverse=True)
+    kept = [bores[k] for k in order]
     # Unused holes, such as screw holes, are filled from the least important one if all of them need too many wedges.
     most = 0 if coarse else _WEDGES
-    while others is not None and kept and count_least_pieces(kept) > most and not _is_near(kept[-1], others):
+    while others is not None and len(kept) > sum(used) and count_least_pieces(kept) > most:
         kept.pop()
     pieces = _bore_holes(outlines, kept, flats)
     while pieces is None and kept:
@@ -149,10 +152,10 @@ def _bore_holes(outlines: Sequence[Array], bores: Sequence[Region], flats: Array
     return pieces or None
 
 
-def _is_near(bore: Region, others: Array | None) -> bool:
-    """Whether points of other solids, (k, 3), come into a hole or to its entrances."""
+def _is_used(bore: Region, others: Array | None) -> bool:
+    """Whether points of other solids, (k, 3), come into a hole."""
     if others is None:
         return False
     height, distance, _ = bore.polar(others)
-    is_level = (height > bore.span[0] - _ENTRANCE_MM) & (height < bore.span[1] + _ENTRANCE_MM)
+    is_level = (height > bore.span[0] + _INSIDE_MM) & (height < bore.span[1] - _INSIDE_MM)
     return bool((is_level & (distance < max(bore.radii))).any())
