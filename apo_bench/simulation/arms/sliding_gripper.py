@@ -61,16 +61,17 @@ def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDesc
     T_tip = pose.inverse(body_frame(data, body)) @ _find_tip(model, data, fingers, closing, ahead)
     one, other = fingers
     joints = (model.joint(one.joint).name, model.joint(other.joint).name)
-    _couple(spec, *joints, states)
+    slope, offset = _couple(spec, *joints, states)
     force = min(_FORCE_N, *(_limit_force(model, f.joint) / 2.0 for f in fingers))
-    _add_drive(spec, joints[0], force)
+    _add_drive(spec, {joints[0]: 0.5, joints[1]: 0.5 / slope}, force)
     # The first row commands the closed fingers into the part.
     beyond = states[0, 0] - np.sign(one.open - one.closed) * _SQUEEZE_M
+    commands = np.array([beyond, *states[:, 0]]) + 0.5 * offset / slope
     hand = Hand(
         actuators=(_DRIVE,),
         joints=joints,
         opening=np.array([gaps[0] - 1e-3, *gaps]) / 2.0,
-        commands=np.array([beyond, *states[:, 0]])[:, None],
+        commands=commands[:, None],
         states=np.array([states[0], *states]),
         force_n=force,
         squeeze_m=_SQUEEZE_M,
@@ -150,20 +151,26 @@ def _find_tip(model: Any, data: Any, fingers: tuple[_Finger, _Finger], closing: 
     return frame(np.column_stack([closing, np.cross(ahead, closing), ahead]), at)
 
 
-def _couple(spec: Any, first: str, second: str, states: Array) -> None:
-    """Let the second finger follow the first one, in place of a coupling or an actuator that the model has."""
+def _couple(spec: Any, first: str, second: str, states: Array) -> tuple[float, float]:
+    """Let the second finger follow the first one, in place of a coupling or an actuator that the model has.
+
+    Returns:
+        (slope, offset): The position of the second joint is slope times that of the first plus offset, [m].
+    """
     for each in [*spec.equalities, *spec.actuators]:
         names = (each.name1, each.name2) if hasattr(each, "name1") else (each.target,)
         if {first, second} & {*names}:
             spec.delete(each)
     along, follows = states[-1] - states[0]
-    slope = follows / along
+    slope = float(follows / along)
+    offset = float(states[0, 1] - slope * states[0, 0])
     coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=second, name2=first)
-    coupling.data[:5] = (states[0, 1] - slope * states[0, 0], slope, 0.0, 0.0, 0.0)
+    coupling.data[:5] = (offset, slope, 0.0, 0.0, 0.0)
     coupling.solref[:] = (0.004, 1.0)
     coupling.solimp[:] = (0.98, 0.999, 0.0001, 0.5, 2.0)
     for name in (first, second):
         spec.joint(name).armature = _ARMATURE_KG
+    return slope, offset
 
 
 def _limit_force(model: Any, joint: int) -> float:
@@ -171,13 +178,17 @@ def _limit_force(model: Any, joint: int) -> float:
     return float(np.abs(model.jnt_actfrcrange[joint]).max()) if model.jnt_actfrclimited[joint] else np.inf
 
 
-def _add_drive(spec: Any, joint: str, force_n: float) -> None:
-    """Add the position actuator of the coupled fingers, critically damped.
+def _add_drive(spec: Any, shares: dict[str, float], force_n: float) -> None:
+    """Add the position actuator of the coupled fingers, critically damped; it pulls at both, so none leads.
 
     Args:
+        shares: Joint -> its coefficient in the tendon that is driven.
         force_n: Largest force of each pad; the actuator has twice as much.
     """
-    drive = spec.add_actuator(name=_DRIVE, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    tendon = spec.add_tendon(name=_DRIVE)
+    for joint, share in shares.items():
+        tendon.wrap_joint(joint, share)
+    drive = spec.add_actuator(name=_DRIVE, target=_DRIVE, trntype=mujoco.mjtTrn.mjTRN_TENDON)
     drive.set_to_position(kp=2.0 * force_n / _SQUEEZE_M, dampratio=1.0)
     drive.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
     drive.forcerange[:] = (-2.0 * force_n, 2.0 * force_n)
