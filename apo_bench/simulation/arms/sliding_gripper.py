@@ -56,7 +56,8 @@ def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDesc
     body = model.body(last).id
     mujoco.mj_kinematics(model, data)
     fingers = _find_fingers(model, data, body, description)
-    states = np.linspace(*fingers.ends, _ROWS)
+    closed, widest = fingers.ends
+    states = np.linspace(closed, widest, _ROWS)
     gaps = [_measure_gap(model, data, fingers, state) for state in states[::-1]][::-1]
     T_tip = pose.inverse(body_frame(data, body)) @ _find_tip(model, data, fingers)  # closed, by the last measurement
     apart = (data.geom_xpos[fingers.pads[0]] - data.geom_xpos[fingers.pads[1]]) @ fingers.closing
