@@ -64,15 +64,15 @@ def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDesc
     names = [model.joint(j).name for j in fingers.joints]
     limits = [np.abs(model.jnt_actfrcrange[j]).max() / 2.0 for j in fingers.joints if model.jnt_actfrclimited[j]]
     force = float(min([_FORCE_N, *limits]))
-    _couple(spec, names, states)
-    _add_drive(spec, names[0], force)
+    slope, offset = _couple(spec, names, states)
+    _add_drive(spec, {names[0]: 0.5, names[1]: 0.5 / slope}, force)
     # The first row commands the closed fingers into the part.
     beyond = states[0, 0] - np.sign(states[-1, 0] - states[0, 0]) * _SQUEEZE_M
     hand = Hand(
         actuators=(_DRIVE,),
         joints=tuple(names),
         opening=np.array([gaps[0] - 1e-3, *gaps]) / 2.0,
-        commands=np.array([beyond, *states[:, 0]])[:, None],
+        commands=(np.array([beyond, *states[:, 0]]) + 0.5 * offset / slope)[:, None],
         states=np.array([states[0], *states]),
         force_n=force,
         squeeze_m=_SQUEEZE_M,
@@ -133,31 +133,41 @@ def _find_tip(model: Any, data: Any, fingers: _Fingers) -> Array:
     return frame(np.column_stack([closing, np.cross(ahead, closing), ahead]), at)
 
 
-def _couple(spec: Any, joints: list[str], states: Array) -> None:
+def _couple(spec: Any, joints: list[str], states: Array) -> tuple[float, float]:
     """Let the second finger follow the first one, in place of a coupling or an actuator that the model has.
 
     Args:
         states: Positions of both joints from closed to open, (n, 2).
+
+    Returns:
+        (slope, offset): The position of the second joint is slope times that of the first plus offset, [m].
     """
     for each in [*spec.equalities, *spec.actuators]:
         if {*joints} & {getattr(each, key, "") for key in ("name1", "name2", "target")}:
             spec.delete(each)
     along, follows = states[-1] - states[0]
+    slope = float(follows / along)
+    offset = float(states[0, 1] - slope * states[0, 0])
     coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joints[1], name2=joints[0])
-    coupling.data[:5] = (states[0, 1] - states[0, 0] * follows / along, follows / along, 0.0, 0.0, 0.0)
+    coupling.data[:5] = (offset, slope, 0.0, 0.0, 0.0)
     coupling.solref[:] = COUPLED_SOLREF
     coupling.solimp[:] = COUPLED_SOLIMP
     for name in joints:
         spec.joint(name).armature = _ARMATURE_KG
+    return slope, offset
 
 
-def _add_drive(spec: Any, joint: str, force_n: float) -> None:
-    """Add the position actuator of the coupled fingers, critically damped.
+def _add_drive(spec: Any, shares: dict[str, float], force_n: float) -> None:
+    """Add the position actuator of the coupled fingers, critically damped; it pulls at both, so none leads.
 
     Args:
+        shares: Joint -> its coefficient in the tendon that is driven.
         force_n: Largest force of each pad; the actuator has twice as much.
     """
-    drive = spec.add_actuator(name=_DRIVE, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    tendon = spec.add_tendon(name=_DRIVE)
+    for joint, share in shares.items():
+        tendon.wrap_joint(joint, share)
+    drive = spec.add_actuator(name=_DRIVE, target=_DRIVE, trntype=mujoco.mjtTrn.mjTRN_TENDON)
     drive.set_to_position(kp=2.0 * force_n / _SQUEEZE_M, dampratio=1.0)
     drive.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
     drive.forcerange[:] = (-2.0 * force_n, 2.0 * force_n)
