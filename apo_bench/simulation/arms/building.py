@@ -20,7 +20,7 @@ from apo_bench.simulation.arms.hands import check_names, find_pad, scale_drive
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import compile_model, load_model
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, is_soft, joint_inertia
-from apo_bench.simulation.arms.sliding_gripper import drive_sliding_gripper
+from apo_bench.simulation.arms.sliding_gripper import COUPLED_SOLIMP, COUPLED_SOLREF, drive_sliding_gripper
 from apo_bench.simulation.arms.stated import model_files, speed_limits, stated_arm
 
 _TIP = "tip"
@@ -28,8 +28,6 @@ _GRIPPER = "gripper/"
 _FINGER_ARMATURE = 1e-4  # [kg m^2]
 _FINGER_DAMPING = 0.02  # [Nm s/rad]
 """Added to finger joints that have neither, since their light links would vibrate without end."""
-_COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
-_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
 _DEFAULT_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they yield 1 mm to a few newtons
 _USUAL_FINGERS_MM_S = 50.0
 """Default speed of each finger, as the hand of a Panda.
@@ -151,8 +149,8 @@ def _fit_gripper(spec: Any, model: Any, last: str, description: ArmDescription) 
     """
     file = description.hand_file
     if file is None:
-        found = drive_sliding_gripper(spec, model, last, description)
-        return _Gripper(found.hand, last, found.T_tip)
+        hand, T_tip = drive_sliding_gripper(spec, model, last, description)
+        return _Gripper(hand, last, T_tip)
     table = read_gripper(file)
     prefix = "" if description.gripper_file is None else _GRIPPER
     left, right = (find_pad(model, prefix + name, file) for name in table.pads)
@@ -204,8 +202,8 @@ def make_passive(spec: Any, joints: Sequence[str]) -> None:
     """
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _DEFAULT_SOLREF:
-            equality.solref[:] = _COUPLED_SOLREF
-            equality.solimp[:] = _COUPLED_SOLIMP
+            equality.solref[:] = COUPLED_SOLREF
+            equality.solimp[:] = COUPLED_SOLIMP
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
     for geom in spec.geoms:

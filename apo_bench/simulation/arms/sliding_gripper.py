@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.arm import Hand
 from apo_bench.simulation.arms.description import ArmDescription
@@ -19,34 +19,35 @@ _ARMATURE_KG = 0.05  # added to each finger, as in the arms that come with the b
 _SECONDS = 0.5  # to close or open
 _TIP_M = 0.01  # of the tip behind the ends of the fingers
 _ROWS = 5  # of the table of openings
-_OPPOSITE = -0.99  # largest cosine between the directions in which the fingers open
+_PARALLEL = 0.99  # least cosine between the axes of the fingers
+_LEAST_M = 1e-6  # from the last body ahead to the fingers
+COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
+COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
 
 
-class FoundGripper(NamedTuple):
-    """A gripper that was found in the model of an arm."""
+class _Fingers(NamedTuple):
+    """Two sliding fingers."""
 
-    hand: Hand
-    T_tip: Array
-    """(4, 4), the tip in the last body of the arm."""
-
-
-class _Finger(NamedTuple):
-    """A sliding finger."""
-
-    joint: int
-    pad: int
-    """The geom that reaches farthest ahead."""
-    closed: float
-    open: float
-    """Joint positions, [m]."""
+    joints: list[int]
+    pads: list[int]
+    """The geom of each finger that reaches farthest ahead."""
+    closing: Array
+    """Direction in which the first finger opens, (3,), world."""
+    ahead: Array
+    """Direction from the last body to the fingers, (3,), world."""
+    ends: Array
+    """(2, 2): positions of both joints when closed, and when open, [m]."""
 
 
-def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDescription) -> FoundGripper:
+def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDescription) -> tuple[Hand, Array]:
     """Couple the two sliding fingers beyond the last body of an arm, and add a position actuator for both.
 
     Args:
         model: The compiled model of `spec`, whose fingers are not driven yet.
         last: The last body of the arm.
+
+    Returns:
+        The gripper, and its tip in the last body, (4, 4).
 
     Raises:
         InputError: There are not two sliding fingers that open in opposite directions.
@@ -54,128 +55,106 @@ def drive_sliding_gripper(spec: Any, model: Any, last: str, description: ArmDesc
     data = mujoco.MjData(model)
     body = model.body(last).id
     mujoco.mj_kinematics(model, data)
-    closing, ahead, fingers = _find_fingers(model, data, body, description)
-    gaps = [_measure_gap(model, data, fingers, closing, share) for share in np.linspace(0.0, 1.0, _ROWS)]
-    states = np.array([[f.closed + s * (f.open - f.closed) for f in fingers] for s in np.linspace(0.0, 1.0, _ROWS)])
-    _put(model, data, fingers, 0.0)
-    T_tip = pose.inverse(body_frame(data, body)) @ _find_tip(model, data, fingers, closing, ahead)
-    one, other = fingers
-    joints = (model.joint(one.joint).name, model.joint(other.joint).name)
-    slope, offset = _couple(spec, *joints, states)
-    force = min(_FORCE_N, *(_limit_force(model, f.joint) / 2.0 for f in fingers))
-    _add_drive(spec, {joints[0]: 0.5, joints[1]: 0.5 / slope}, force)
+    fingers = _find_fingers(model, data, body, description)
+    closed, widest = fingers.ends
+    states = np.linspace(closed, widest, _ROWS)
+    gaps = [_measure_gap(model, data, fingers, state) for state in states[::-1]][::-1]
+    T_tip = pose.inverse(body_frame(data, body)) @ _find_tip(model, data, fingers)  # closed, by the last measurement
+    apart = (data.geom_xpos[fingers.pads[0]] - data.geom_xpos[fingers.pads[1]]) @ fingers.closing
+    names = [model.joint(j).name for j in fingers.joints]
+    limits = [np.abs(model.jnt_actfrcrange[j]).max() / 2.0 for j in fingers.joints if model.jnt_actfrclimited[j]]
+    force = float(min([_FORCE_N, *limits]))
+    slope, offset = _couple(spec, names, states)
+    _add_drive(spec, {names[0]: 0.5, names[1]: 0.5 / slope}, force)
     # The first row commands the closed fingers into the part.
-    beyond = states[0, 0] - np.sign(one.open - one.closed) * _SQUEEZE_M
-    commands = np.array([beyond, *states[:, 0]]) + 0.5 * offset / slope
+    beyond = states[0, 0] - np.sign(states[-1, 0] - states[0, 0]) * _SQUEEZE_M
     hand = Hand(
         actuators=(_DRIVE,),
-        joints=joints,
+        joints=tuple(names),
         opening=np.array([gaps[0] - 1e-3, *gaps]) / 2.0,
-        commands=commands[:, None],
+        commands=(np.array([beyond, *states[:, 0]]) + 0.5 * offset / slope)[:, None],
         states=np.array([states[0], *states]),
         force_n=force,
         squeeze_m=_SQUEEZE_M,
-        friction=float(model.geom_friction[one.pad, 0]),
+        friction=float(model.geom_friction[fingers.pads[0], 0]),
         seconds=_SECONDS,
-        pads=(model.geom(one.pad).name, model.geom(other.pad).name),
-        thick_m=_measure_centres(data, fingers, closing) - gaps[0],
+        pads=(model.geom(fingers.pads[0]).name, model.geom(fingers.pads[1]).name),
+        thick_m=float(apart) - gaps[0],
     )
-    return FoundGripper(hand, T_tip)
+    return hand, T_tip
 
 
-def _find_fingers(
-    model: Any, data: Any, body: int, description: ArmDescription
-) -> tuple[Array, Array, tuple[_Finger, _Finger]]:
-    """Return the direction in which the first finger opens and that ahead, (3,), world, and the fingers."""
-    slides = [
-        j
-        for j in range(model.njnt)
-        if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
-        and model.jnt_limited[j]
-        and int(model.jnt_bodyid[j]) in below(model, body)
-    ]
-    geoms = [[g for g in range(model.ngeom) if int(model.geom_bodyid[g]) == model.jnt_bodyid[j]] for j in slides]
-    if len(slides) != 2 or not all(geoms):
-        raise InputError(
-            f"{description.file}: the model has no two sliding fingers with a range and a shape beyond "
-            f"'{model.body(body).name}'; name a gripper file as 'hand' in [gripper], or state 'slides'."
-        )
+def _find_fingers(model: Any, data: Any, body: int, description: ArmDescription) -> _Fingers:
+    """Return the two sliding fingers beyond a body."""
+    slide = int(mujoco.mjtJoint.mjJNT_SLIDE)
+    hanging = below(model, body)
+    slides = [j for j in range(model.njnt) if int(model.jnt_type[j]) == slide and int(model.jnt_bodyid[j]) in hanging]
+    geoms = [np.flatnonzero(model.geom_bodyid == model.jnt_bodyid[j]) for j in slides]
+    require(
+        len(slides) == 2 and all(map(len, geoms)) and bool(model.jnt_limited[slides].all()),
+        f"{description.file}: the model has no two sliding fingers with a range and a shape beyond "
+        f"'{model.body(body).name}'; name a gripper file as 'hand' in [gripper], or state 'slides'.",
+    )
     middles = np.array([data.geom_xpos[g].mean(axis=0) for g in geoms])
     axes = data.xaxis[slides]
-    apart = middles[0] - middles[1]
-    closing = axes[0] * np.sign(axes[0] @ apart)
-    signs = np.sign([axes[0] @ closing, -axes[1] @ closing])
-    way = middles.mean(axis=0) - data.xpos[body]
-    way = way - (way @ closing) * closing
-    if (signs[0] * axes[0]) @ (signs[1] * axes[1]) > _OPPOSITE or np.linalg.norm(way) < 1e-6:
-        raise InputError(
-            f"{description.file}: the fingers do not open in opposite directions across the way ahead; state them as "
-            "'slides', 'tip', 'opening_mm' and 'actuators' in [gripper]."
-        )
-    ahead = way / np.linalg.norm(way)
-    fingers = []
-    for j, own, sign in zip(slides, geoms, signs, strict=True):
-        closed, widest = model.jnt_range[j][:: int(sign)].tolist()
-        fingers.append(_Finger(j, max(own, key=lambda g: geom_reach(model, data, g, ahead)), closed, widest))
-    return closing, ahead, (fingers[0], fingers[1])
+    closing = axes[0] * np.sign(axes[0] @ (middles[0] - middles[1]))
+    signs = np.sign(axes @ closing) * [1, -1]
+    ahead = middles.mean(axis=0) - data.xpos[body]
+    ahead = ahead - (ahead @ closing) * closing
+    require(
+        abs(axes[0] @ axes[1]) > _PARALLEL and np.linalg.norm(ahead) > _LEAST_M,
+        f"{description.file}: the fingers do not open in opposite directions across the way ahead; state them as "
+        "'slides', 'tip', 'opening_mm' and 'actuators' in [gripper].",
+    )
+    ahead /= np.linalg.norm(ahead)
+    pads = [int(max(own, key=lambda g: geom_reach(model, data, int(g), ahead))) for own in geoms]
+    ends = np.array([model.jnt_range[j][:: int(sign)] for j, sign in zip(slides, signs, strict=True)]).T
+    return _Fingers(slides, pads, closing, ahead, ends)
 
 
-def _put(model: Any, data: Any, fingers: tuple[_Finger, _Finger], share: float) -> None:
-    """Open the fingers by a share of their ranges."""
-    for each in fingers:
-        data.qpos[model.jnt_qposadr[each.joint]] = each.closed + share * (each.open - each.closed)
+def _measure_gap(model: Any, data: Any, fingers: _Fingers, state: Array) -> float:
+    """Put the joints to positions, (2,), and return the distance of the pads, [m]; negative if they overlap."""
+    data.qpos[model.jnt_qposadr[fingers.joints]] = state
     mujoco.mj_kinematics(model, data)
+    return -sum(
+        geom_reach(model, data, pad, sign * fingers.closing) for pad, sign in zip(fingers.pads, (-1, 1), strict=True)
+    )
 
 
-def _measure_gap(model: Any, data: Any, fingers: tuple[_Finger, _Finger], closing: Array, share: float) -> float:
-    """Return the distance of the pads at a share of the opening, [m]; negative if they overlap."""
-    _put(model, data, fingers, share)
-    one, other = fingers
-    return -geom_reach(model, data, one.pad, -closing) - geom_reach(model, data, other.pad, closing)
-
-
-def _measure_centres(data: Any, fingers: tuple[_Finger, _Finger], closing: Array) -> float:
-    """Return the distance of the middles of the pads along the direction in which they close, [m]."""
-    return float((data.geom_xpos[fingers[0].pad] - data.geom_xpos[fingers[1].pad]) @ closing)
-
-
-def _find_tip(model: Any, data: Any, fingers: tuple[_Finger, _Finger], closing: Array, ahead: Array) -> Array:
-    """Return the frame between the closed fingertips, (4, 4), world: z ahead, x along the closing direction."""
-    one, other = fingers
-    pads = [one.pad, other.pad]
-    end = min(geom_reach(model, data, g, ahead) for g in pads)
-    root = max(-geom_reach(model, data, g, -ahead) for g in pads)
-    at = data.geom_xpos[pads].mean(axis=0)
-    middle = (geom_reach(model, data, other.pad, closing) - geom_reach(model, data, one.pad, -closing)) / 2.0
+def _find_tip(model: Any, data: Any, fingers: _Fingers) -> Array:
+    """Return the frame between the fingertips, (4, 4), world: z ahead, x along the closing direction."""
+    one, other = fingers.pads
+    _, _, closing, ahead, _ = fingers
+    end = min(geom_reach(model, data, pad, ahead) for pad in fingers.pads)
+    root = max(-geom_reach(model, data, pad, -ahead) for pad in fingers.pads)
+    middle = (geom_reach(model, data, other, closing) - geom_reach(model, data, one, -closing)) / 2.0
+    at = data.geom_xpos[fingers.pads].mean(axis=0)
     at += (middle - at @ closing) * closing + (max(end - _TIP_M, (end + root) / 2.0) - at @ ahead) * ahead
     return frame(np.column_stack([closing, np.cross(ahead, closing), ahead]), at)
 
 
-def _couple(spec: Any, first: str, second: str, states: Array) -> tuple[float, float]:
+def _couple(spec: Any, joints: list[str], states: Array) -> tuple[float, float]:
     """Let the second finger follow the first one, in place of a coupling or an actuator that the model has.
+
+    Args:
+        states: Positions of both joints from closed to open, (n, 2).
 
     Returns:
         (slope, offset): The position of the second joint is slope times that of the first plus offset, [m].
     """
     for each in [*spec.equalities, *spec.actuators]:
-        names = (each.name1, each.name2) if hasattr(each, "name1") else (each.target,)
-        if {first, second} & {*names}:
+        if {*joints} & {getattr(each, key, "") for key in ("name1", "name2", "target")}:
             spec.delete(each)
     along, follows = states[-1] - states[0]
     slope = float(follows / along)
     offset = float(states[0, 1] - slope * states[0, 0])
-    coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=second, name2=first)
+    coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joints[1], name2=joints[0])
     coupling.data[:5] = (offset, slope, 0.0, 0.0, 0.0)
-    coupling.solref[:] = (0.004, 1.0)
-    coupling.solimp[:] = (0.98, 0.999, 0.0001, 0.5, 2.0)
-    for name in (first, second):
+    coupling.solref[:] = COUPLED_SOLREF
+    coupling.solimp[:] = COUPLED_SOLIMP
+    for name in joints:
         spec.joint(name).armature = _ARMATURE_KG
     return slope, offset
-
-
-def _limit_force(model: Any, joint: int) -> float:
-    """Return the largest force of a joint, [N]; infinite if not stated."""
-    return float(np.abs(model.jnt_actfrcrange[joint]).max()) if model.jnt_actfrclimited[joint] else np.inf
 
 
 def _add_drive(spec: Any, shares: dict[str, float], force_n: float) -> None:
