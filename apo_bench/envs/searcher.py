@@ -1,9 +1,10 @@
 """The policy `searcher`: search where the stated relative error is large, and yield where forces tell it.
 
-Where contact stops the approach, the tip follows a growing ellipse whose axes are proportional to the stated standard
-deviations of the part relative to the hole. Across an axis that is known better than the play, the ellipse becomes a
-line, and only the filtered side force moves the tip. Inside of the hole the side force alone does, and the part goes in
-while walls do not rub.
+Where contact stops the part, the tip moves in steps along a growing ellipse whose axes are proportional to the stated
+standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
+steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
+and the part can drop. Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part
+is soon stopped again, that was no hole: it is drawn back, and the search goes on.
 """
 
 import math
@@ -16,29 +17,37 @@ from apo_bench.envs.apo_insert import APOInsert
 from apo_bench.envs.policies import aim_at
 from apo_bench.geometry import Array
 
-_FILTER = 0.25  # weight of the newest wrench
-_STALLED = 4  # actions without progress after which the approach counts as stopped
+_FILTER = 0.4  # weight of the newest side force
 _PROGRESS_MM = 0.05  # least progress of an action that is not stopped
+_STALLED = 4  # actions without progress after which contact has stopped the part
 _NEAR_MM = 1.0  # distance left below which a stop is no reason to search
-_SIGMAS = 2.5  # half axes of the largest ellipse, in stated standard deviations,
+_AGAIN_MM = 1.0  # distance from the last stop within which the last search goes on
+_HOLE_MM = 10.0  # least depth of a hole beyond the last stop
+_BACK_MM = 0.2  # distance before the last stop to which the part is drawn out of what is no hole,
+_BACK = 20  # within so many actions,
+_SKIPPED = 3  # and so many steps away
+_SIGMAS = 3.0  # half axes of the first ellipse, in stated standard deviations,
 _PLAY_MM = 0.3  # less this: a smaller error needs no search
-_WIDER = 0.25  # growth of the half axes with each further search
-_MOST_MM = 3.0  # greatest half axis
-_PITCH_MM = 0.35  # growth of the larger half axis with each turn
-_SPEED_MM = 0.25  # along the ellipse with each action
+_MOST_MM = 3.0  # greatest half axis of the first ellipse
+_WIDER = 0.4  # growth of the half axes with each further search
+_PITCH_MM = 0.35  # between turns
+_TURNS = 1.5  # turns, in pitches of the smaller half axis,
+_LEAST_TURNS = 2  # but at least these
+_STEP_MM = 0.35  # along the ellipse
 _YAWS = (0.0, 1.0, -1.0, 2.0, -2.0)  # turns about the axis, one for each search, in stated standard deviations
+_REST = 1  # actions after each step
 _CALM = 25  # actions without resistance for which the approach goes on alone
-_DEEP_MM = 1.5  # progress after a stop that means that the part is in the hole
-_HELD_MM = 0.4  # the same where walls push it from the side
-_HELD_N = 1.2  # by this side force
+_ENTERED_MM = 0.5  # progress after a stop that means that the part is in the hole
+_FRICTION = 0.8  # side force that friction explains, as a share of the push,
+_MARGIN_N = 0.5  # and on top of this share: beyond both, walls hold the part
 _YIELD_MM_N = 0.6  # displacement of the tip by a side force with each action
 _YIELD_MM = 0.2  # greatest displacement of an action
-_ROOM_MM = 1.2  # greatest displacement in the hole from where it was found
-_DEAD_N = 0.02  # side force that is noise
-_RUB_N = 0.06  # side force in the hole above which the part stands
-_DRIVE_N = 0.2  # push below which the part goes in faster than the approach
-_DRIVE = 0.5  # by this action
-_STUCK = 30  # actions without progress in the hole after which the search goes on
+_NOISE_N = 0.02  # side force that is noise
+_RUB_N = 0.06  # side force above which the part waits
+_FREE_MM = 1.5  # progress of an action in free air
+_PUSHED_N = 0.3  # push of a contact ahead
+_QUIET = 6  # actions after it in which the approach goes on alone
+_DRIVE = 0.5  # action along the axis that is added to the approach
 
 
 @final
@@ -47,83 +56,104 @@ class Searcher:
 
     def __init__(self, env: APOInsert) -> None:
         self._env = env
-        self._phase = self._approach
+        self._phase = self._advance
         self._target = np.zeros(6)  # [mm, deg]
-        self._middle = np.zeros(2)  # of the ellipse, [mm]
-        self._force = np.zeros(3)  # filtered, [N]
-        self._best = math.inf  # smallest distance left in this phase, [mm]
+        self._side = np.zeros(2)  # filtered side force, [N]
+        self._push = 0.0  # force against the direction, [N]
+        self._quiet = 0  # actions since a contact ahead
+        self._left = math.inf  # distance left, [mm]
+        self._gained = math.inf  # by the last action, [mm]
+        self._best = math.inf  # smallest distance left so far, [mm]
         self._waited = 0  # actions since then
-        self._left = math.inf  # distance left at the last action, [mm]
-        self._gained = 0.0  # by the last action, [mm]
-        self._stopped = 0.0  # distance left at which contact stopped the part, [mm]
-        self._press = 0.1  # push at that moment, [N]
-        self._angle = 0.0  # along the ellipses, [rad]
-        self._searches = 0
+        self._stopped = math.inf  # distance left where contact stopped the part, [mm]
+        self._press = 0.0  # push at that moment, [N]
+        self._middle = np.zeros(2)  # of the ellipse, [mm]
+        self._angle = 0.0  # along the ellipse, [rad]
+        self._searches = 0  # that are over
+        self._calm = 0  # actions without resistance
+        self._rested = 0  # actions since the last step
 
     def __call__(self, observation: Mapping[str, Any]) -> Array:
-        self._force += _FILTER * (np.asarray(observation["wrench"][:3], np.float64) - self._force)
-        left = float(observation["plan"][3])
-        self._gained = self._left - left
-        self._left = left
-        progress = left < self._best - _PROGRESS_MM
-        self._waited = 0 if progress else self._waited + 1
-        self._best = min(self._best, left)
-        ahead = self._phase(left, np.asarray(observation["plan"][6:12], np.float64))
+        self._read(np.asarray(observation["wrench"], np.float64), float(observation["plan"][3]))
+        ahead = self._phase(np.asarray(observation["plan"][6:12], np.float64))
         return aim_at(self._env, self._target, ahead)
 
-    def _approach(self, left: float, deviations: Array) -> float:
-        """Leave the motion to the approach until contact stops it."""
-        if self._waited >= _STALLED and left > _NEAR_MM:
-            self._press = max(-float(self._force[2]), 0.1)
-            self._begin_search(left)
+    def _read(self, wrench: Array, left: float) -> None:
+        """Take the present measurements."""
+        self._side += _FILTER * (wrench[:2] - self._side)
+        self._push = -float(wrench[2])
+        self._quiet = 0 if self._push > _PUSHED_N else self._quiet + 1
+        self._gained = self._left - left
+        self._left = left
+        self._waited = 0 if left < self._best - _PROGRESS_MM else self._waited + 1
+        self._best = min(self._best, left)
+
+    def _advance(self, deviations: Array) -> float:
+        """Yield to the side force and go on while walls do not rub, until contact stops the part."""
+        if self._waited >= _STALLED and self._left > _NEAR_MM:
+            return self._begin_search(deviations)
+        if self._gained > _FREE_MM:
+            return 0.0
+        self._target[:2] += self._yielded(_NOISE_N)
+        if math.hypot(*self._side) > _RUB_N:  # take back the last progress, but draw no part out
+            return -float(np.clip(self._gained, 0.0, 1.0))
+        return _DRIVE if self._stopped < math.inf and self._quiet > _QUIET else 0.0
+
+    def _begin_search(self, deviations: Array) -> float:
+        """Search from here on; where the part was stopped before, or from what is no hole, the last search goes on."""
+        deeper = self._stopped - self._left
+        self._waited = self._calm = 0
+        if _AGAIN_MM < deeper < _HOLE_MM:
+            self._phase = self._draw_back
+            for _ in range(_SKIPPED):
+                self._step(deviations)
+            return -1.0
+        if abs(deeper) > _AGAIN_MM:
+            self._middle = self._target[:2].copy()
+            self._angle = 0.0
+            self._searches = 0
+        self._phase = self._search
+        self._stopped = self._left
+        self._press = max(self._push, 0.1)
         return 0.0
 
-    def _begin_search(self, left: float) -> None:
-        """Search from here on."""
+    def _draw_back(self, deviations: Array) -> float:
+        """Draw the part back to before the last stop."""
+        if self._left < self._stopped + _BACK_MM and self._waited < _BACK:
+            return -1.0
         self._phase = self._search
-        self._stopped = left
-        self._middle = self._target[:2].copy()
-        self._waited = 0
-        self._angle = 0.0
+        return 0.0
 
-    def _search(self, left: float, deviations: Array) -> float:
-        """Move on along the ellipses while the part meets resistance; go in where walls hold it."""
-        is_held = math.hypot(*self._force[:2]) > _HELD_N and left < self._stopped - _HELD_MM
-        if is_held or left < self._stopped - _DEEP_MM:
-            self._phase = self._go_in
-            self._middle = self._target[:2].copy()
-            self._best, self._waited = left, 0
+    def _search(self, deviations: Array) -> float:
+        """Step along the ellipse while the part meets resistance."""
+        if self._left < self._stopped - _ENTERED_MM:
+            self._phase = self._advance
+            self._best, self._waited = self._left, 0
             return 0.0
-        if -float(self._force[2]) > self._press / 4:
-            self._waited = 0
-        if 0 < self._waited < _CALM:
-            return 0.0
+        self._middle += self._yielded(_FRICTION * max(self._push, 0.0) + _MARGIN_N)
+        self._calm = self._calm + 1 if self._push < self._press / 4 else 0
+        self._rested += 1
+        if self._rested > _REST and not 0 < self._calm < _CALM:
+            self._rested = 0
+            self._step(deviations)
+        return 0.0
+
+    def _step(self, deviations: Array) -> None:
+        """Move on along the ellipse; begin the next, larger one at its end, to the other side and with another turn."""
         axes = np.clip(_SIGMAS * deviations[:2] - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
-        self._middle += np.where(axes > 0.0, 0.0, self._yielded())
-        largest = float(axes.max())
-        whole = 2 * math.pi * max(math.ceil(largest / _PITCH_MM), 1)  # angle of all turns
+        turns = max(math.ceil(_TURNS * float(axes.min()) / _PITCH_MM), _LEAST_TURNS)
+        whole = 2 * math.pi * turns
         if self._angle > whole:
             self._searches += 1
             self._angle = 0.0
-        self._angle += _SPEED_MM / max(self._angle / whole * largest, _PITCH_MM)
+        along = math.hypot(axes[0] * math.sin(self._angle), axes[1] * math.cos(self._angle))  # for each radian
         share = self._angle / whole  # of the largest ellipse
-        self._target[:2] = self._middle + share * axes * (math.cos(self._angle), math.sin(self._angle))
+        self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
+        aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
+        self._target[:2] = self._middle + self._angle / whole * aside
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
-        return 0.0
 
-    def _go_in(self, left: float, deviations: Array) -> float:
-        """Yield to the side force, and go in while walls do not rub; search on where the part is stuck."""
-        if self._waited > _STUCK and left > _NEAR_MM:
-            self._begin_search(left)
-            return 0.0
-        self._target[:2] = self._middle + np.clip(
-            self._target[:2] + self._yielded() - self._middle, -_ROOM_MM, _ROOM_MM
-        )
-        if math.hypot(*self._force[:2]) > _RUB_N:  # take back the last progress, but draw no part out
-            return -float(np.clip(self._gained, 0.0, 1.0))
-        return _DRIVE if -float(self._force[2]) < _DRIVE_N else 0.0
-
-    def _yielded(self) -> Array:
-        """Return by how much the tip yields to the filtered side force, (2,), [mm]."""
-        side = np.where(np.abs(self._force[:2]) > _DEAD_N, self._force[:2], 0.0)
-        return np.clip(_YIELD_MM_N * side, -_YIELD_MM, _YIELD_MM)
+    def _yielded(self, beyond: float) -> Array:
+        """Return by how much the tip yields to the side force beyond a size, [N]: (2,), [mm]."""
+        size = math.hypot(*self._side)
+        return self._side * (min(_YIELD_MM_N * (size - beyond), _YIELD_MM) / size) if size > beyond else np.zeros(2)
