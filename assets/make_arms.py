@@ -117,23 +117,25 @@ def linkage_gripper() -> ElementTree.Element:
 
 
 def parallel_gripper() -> ElementTree.Element:
-    """Two slides, 80 mm wide open, of the size and force of the hand that a Panda has."""
+    """Two slides, 80 mm wide open, of the size and force of the hand that a Panda has, and one drive for both alike."""
     root, base = _begin("parallel_gripper", None)
     _inertial(base, 0.73, (0, 0, 0.03), 0.05, 0.1)
     _shape(base, "palm", "box", (0, 0, 0.032), (0.1, 0.025, 0.032))
+    tendon = ElementTree.SubElement(ElementTree.SubElement(root, "tendon"), "fixed", {"name": "grip"})
     equality = ElementTree.SubElement(root, "equality")
     actuators = ElementTree.SubElement(root, "actuator")
     for side, s in (("left", -1.0), ("right", 1.0)):
         finger = _body(base, f"{side}_finger", (0, 0, 0.0584))
         slide = {"name": f"{side}_finger", "type": "slide", "axis": f"{s:g} 0 0", "range": "0 0.04"}
         ElementTree.SubElement(finger, "joint", {**slide, "armature": "0.05", "damping": "5"})
+        ElementTree.SubElement(tendon, "joint", {"joint": f"{side}_finger", "coef": "0.5"})
         _inertial(finger, 0.015, (s * 0.006, 0, 0.025), 0.01, 0.04)
         _shape(finger, f"{side}_finger", "box", (s * 0.009, 0, 0.016), (0.006, 0.0105, 0.017))
         _shape(finger, f"{side}_pad", "box", (s * 0.006, 0, 0.0445), (0.006, 0.0105, 0.0105), "pad")
     stiff = {"solref": "0.004 1", "solimp": "0.98 0.999 0.0001 0.5 2"}
     both = {"joint1": "left_finger", "joint2": "right_finger", "polycoef": "0 1 0 0 0", **stiff}
     ElementTree.SubElement(equality, "joint", both)
-    drive = {"name": "grip", "joint": "right_finger", "kp": "4000", "dampratio": "1", "ctrlrange": "-0.03 0.04"}
+    drive = {"name": "grip", "tendon": "grip", "kp": "4000", "dampratio": "1", "ctrlrange": "-0.03 0.04"}
     ElementTree.SubElement(actuators, "position", {**drive, "forcerange": "-70 70"})
     return root
 

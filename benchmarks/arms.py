@@ -52,18 +52,19 @@ def page(rows: Sequence[TrialRecord]) -> str:
 
 
 def _lines(arms: Sequence[str], rows: Sequence[TrialRecord]) -> Iterator[list[str]]:
-    rates = {key: rate_of(each) for key, each in group(rows, lambda row: (*_place(row), str(row["arm"]))).items()}
-    for place in sorted({key[:3] for key in rates}):
-        found = [rates.get((*place, arm)) for arm in arms]
-        yield [place[0], f"`{place[1]}`", place[2], *(f"{r.successes} of {r.trials}" if r else "" for r in found)]
-    whole = {key: rate_of(each) for key, each in group(rows, lambda row: (*_place(row)[1:], str(row["arm"]))).items()}
+    keys = group(rows, lambda row: (row["scenario"], row["method"], str(row["arm"])))
+    rates = {key: rate_of(each) for key, each in keys.items()}
+    for scenario, method in sorted({key[:2] for key in rates}):
+        found = [rates.get((scenario, method, arm)) for arm in arms]
+        yield [scenario, f"`{method}`", "any", *(f"{r.successes} of {r.trials}" if r else "" for r in found)]
+    whole = {key: rate_of(each) for key, each in group(rows, lambda row: (*_place(row), str(row["arm"]))).items()}
     for method, noise in sorted({key[:2] for key in whole}):
         yield ["**all**", f"`{method}`", noise, *(counted(whole.get((method, noise, arm))) for arm in arms)]
 
 
-def _place(row: TrialRecord) -> tuple[str, str, str]:
-    """Return scenario, method and noise level; the oracle meets no noise."""
-    return row["scenario"], row["method"], "any" if row["method"] == "oracle" else f"{row['noise_mm']:g}"
+def _place(row: TrialRecord) -> tuple[str, str]:
+    """Return method and noise level; the oracle meets no noise."""
+    return row["method"], "any" if row["method"] == "oracle" else f"{row['noise_mm']:g}"
 
 
 def _failures(rows: Sequence[TrialRecord]) -> list[str]:

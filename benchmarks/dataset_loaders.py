@@ -22,6 +22,7 @@ MADE = {
     "replays": ("block_on_block", "dovetail", "--episodes", "2", "--noise-level", "2", "--method", "contact"),
     "insertions": ("block_on_block", "--episodes", "2", "--episode-type", "insertions"),
 }
+IMAGES = ("--pixels", "scene", "--pixels", "wrist")  # of insertions for LeRobot
 NEEDS = {
     "lerobot": ("lerobot[dataset,training]", str(ROOT)),
     "minari": ("minari[hdf5]", "pillow"),
@@ -37,11 +38,18 @@ root = Path(sys.argv[1])
 data = LeRobotDataset("apo_bench/data", root=root)
 table = parquet.read_table(root / "data")
 assert len(data) == table.num_rows
+frames = [data[i] for i in range(len(data))]
 for name in table.column_names:
     here = np.array(table[name].to_pylist())
-    read = np.stack([np.asarray(data[i][name]) for i in range(len(data))])
+    read = np.stack([np.asarray(frame[name]) for frame in frames])
     assert np.array_equal(here.reshape(read.shape).astype(read.dtype), read), name
-assert set(data.meta.stats) == set(table.column_names) and {"q01", "q99"} <= set(data.meta.stats["action"])
+for name in data.meta.video_keys:
+    read = np.stack([np.asarray(frame[name]) for frame in frames])
+    assert read.shape == (len(data), *data.meta.shapes[name][-1:], *data.meta.shapes[name][:2]), name
+    mean = np.asarray(data.meta.stats[name]["mean"])
+    assert np.abs(read.mean(axis=(0, 2, 3)) - mean.ravel()).max() < 0.01, name  # compression changes colours a little
+assert set(data.meta.stats) == {*table.column_names, *data.meta.video_keys}
+assert {"q01", "q99"} <= set(data.meta.stats["action"])
 assert data.meta.tasks.iloc[0].name == data[0]["task"]
 times = {"observation.state": [-0.1, 0.0], "action": [0.0, 0.05]}
 first = LeRobotDataset("apo_bench/data", root=root, episodes=[1], delta_timestamps=times)[0]
@@ -49,7 +57,7 @@ assert first["observation.state"].shape[0] == 2 and first["observation.state_is_
 right = LeRobotDataset("apo_bench/data", root=root, episode_filter=lambda episode: episode["success"])
 batch = next(iter(torch.utils.data.DataLoader(data, batch_size=8, shuffle=True)))
 print(f"LeRobot {version('lerobot')}: {data.num_episodes} episodes, {len(data)} frames, {right.num_episodes} right,",
-      f"batches of {tuple(batch['action'].shape)} actions")
+      f"batches of {tuple(batch['action'].shape)} actions, images {data.meta.video_keys}")
 """
 MINARI = """
 import json, os, sys
@@ -91,19 +99,20 @@ def environment(folder: Path, python: str, needs: tuple[str, ...]) -> Path:
     return made
 
 
-def trains(python: Path, data: Path) -> None:
-    """A few steps of a small policy, and an episode of it, by LeRobot's commands and the files of the guide."""
+def trains(python: Path, data: Path, steps: int) -> None:
+    """Some steps of a small policy of images, and two episodes of it, by LeRobot's commands and the guide's files."""
     here = data.parent / "trained"
     guide = (ROOT / "docs" / "guide" / "lerobot.md").read_text(encoding="utf-8")
     for name, text in re.findall(r'^```py(?:thon)? title="([^"]+)"\n(.*?)^```$', guide, re.M | re.S):
         (here / name).parent.mkdir(parents=True, exist_ok=True)
-        (here / name).write_text(text, encoding="utf-8")
+        (here / name).write_text(text.replace("CAMERAS = ()", 'CAMERAS = ("scene", "wrist")'), encoding="utf-8")
     small = "--policy.type=act --policy.dim_model=64 --policy.n_heads=2 --policy.push_to_hub=false"
-    steps = "--steps=5 --save_freq=5 --batch_size=8 --num_workers=0 --policy.device=cpu --output_dir=act"
+    small += " --policy.pretrained_backbone_weights=null"  # they would be downloaded
+    how = f"--steps={steps} --save_freq={steps} --batch_size=8 --num_workers=0 --policy.device=cpu --output_dir=act"
     taken = "--policy.path=act/checkpoints/last/pretrained_model --policy.device=cpu --env.type=apo_insert"
     tried = "--env.discover_packages_path=apo_lerobot --eval.n_episodes=2 --eval.batch_size=2 --output_dir=tried"
     for command, words in (
-        ("lerobot-train", f"{small} {steps} --dataset.repo_id=me/inserted --dataset.root={data}"),
+        ("lerobot-train", f"{small} {how} --dataset.repo_id=me/inserted --dataset.root={data}"),
         ("lerobot-eval", f"{taken} {tried}"),
     ):
         alone = os.environ | {"PYTHONPATH": str(here), "HF_HUB_OFFLINE": "1", "HF_HOME": str(data.parent / "hub")}
@@ -128,6 +137,7 @@ def reads(python: Path, program: str, folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--envs", type=Path, help="a folder where environments are kept")
+    parser.add_argument("--steps", type=int, default=5, help="training steps of LeRobot's policy")
     parser.add_argument("--python312", default="python3.12", help="Python 3.12 or later, for LeRobot")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -140,13 +150,15 @@ def main() -> None:
                 if (form, what) == ("parquet", "insertions"):
                     continue
                 out = here / f"{what}-{form}"
-                make = (sys.executable, "-m", "apo_bench", "dataset", "make", *words, "--format", form, "--out", out)
+                more = IMAGES if (form, what) == ("lerobot", "insertions") else ()
+                made = *words, *more, "--format", form, "--out", out
+                make = (sys.executable, "-m", "apo_bench", "dataset", "make", *made)
                 subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
                 print(f"{what}, {form}:", flush=True)
                 if form == "lerobot":
                     reads(lerobot, LEROBOT, out)
                     if what == "insertions":
-                        trains(lerobot, out)
+                        trains(lerobot, out, given.steps)
                 if form == "minari":
                     reads(others, MINARI, out)
 

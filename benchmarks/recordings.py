@@ -26,28 +26,12 @@ from apo_bench.importers.recording.matching import match_tracks
 from apo_bench.importers.recording.objects_file import ObjectsFile, TrackedPart
 from apo_bench.importers.recording.ordering import Stated
 from apo_bench.importers.recording.tracks import LogRows, sort_rows
-from apo_bench.scenario import place_layout
+from apo_bench.scenario import list_scenario_names, place_layout
 from benchmarks.rates_by_condition import table
 from tests.recorded import CAMERA, motion
 
 RESULTS = Path(__file__).parent / "results" / "recordings.csv"
-SCENARIOS = (
-    "block_on_block",
-    "bridge_cycle",
-    "carried_bridge",
-    "dovetail",
-    "fixture_alignment",
-    "gearbox",
-    "l_bracket_on_plate",
-    "nested_bushings",
-    "peg_in_hole",
-    "pocket_table",
-    "shaft_through_brackets",
-    "stick_in_tower",
-    "stick_on_castles",
-    "vanished_fixture",
-    "wedge_under_roof",
-)
+SCENARIOS = list_scenario_names()
 FRAME = 0.5 * np.repeat([1e-3, np.radians(1.0)], 3)  # standard deviations of each frame, and of each rest
 TURNS = 24  # images of a part of revolution
 HIDDEN_S = 3.0

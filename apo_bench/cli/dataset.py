@@ -38,7 +38,7 @@ Examples:
   apo-bench dataset make stick_in_tower --format bop --episodes 20 --out images
 """
 commands = make_group("dataset", _HELP)
-_WITHOUT_EFFECT = ("noise_level", "noise", "method", "robot_error", "arm", "episode_type", "policy")
+_WITHOUT_EFFECT = ("noise_level", "noise", "method", "robot_error", "arm", "episode_type", "policy", "pixels")
 """Options without a meaning for images."""
 _SPLITS = ("test", "val")
 """Splits of images; the seeds of the second are those of trials for training."""
@@ -83,6 +83,10 @@ def dataset_make(
         str | None,
         typer.Option(help="Policy of insertions: expert (default), straight, spiral, searcher, probe, or module:name."),
     ] = None,
+    pixels: Annotated[
+        list[str] | None,
+        typer.Option(help="Camera of videos of insertions, with --format lerobot: scene or wrist; may be repeated."),
+    ] = None,
     split: Annotated[
         str, typer.Option(help="With --format bop: test, or val (images to fit noise to; other seeds).")
     ] = "test",
@@ -104,9 +108,9 @@ def dataset_make(
         trials = _list_trials(
             (scenario, *(more or ())), options, FIRST_TRAINING_TRIAL if seed is None else seed, episodes
         )
-        _make_episodes(trials, out, command, format, episode_type or "replays", policy)
+        _make_episodes(trials, out, command, format, episode_type or "replays", policy, pixels or ())
         return
-    for name, value in (options | {"episode_type": episode_type, "policy": policy}).items():
+    for name, value in (options | {"episode_type": episode_type, "policy": policy, "pixels": pixels}).items():
         flag = f"--{name.replace('_', '-')}"
         require(value is None or name not in _WITHOUT_EFFECT, f"{flag} has no effect on images; leave it out.")
     if secret is not None:
@@ -132,7 +136,13 @@ def _list_trials(names: Sequence[str], options: dict[str, Any], seed: int, episo
 
 
 def _make_episodes(
-    trials: Sequence[TrialConfig], out: Path, command: str, format: str, episode_type: str, policy: str | None
+    trials: Sequence[TrialConfig],
+    out: Path,
+    command: str,
+    format: str,
+    episode_type: str,
+    policy: str | None,
+    pixels: Sequence[str],
 ) -> None:
     """Run trials and write a data set to learn from."""
     from apo_bench.benchmark.datasets.trial_dataset import make_dataset
@@ -149,7 +159,7 @@ def _make_episodes(
     require(policy is None or insertions, f"--policy {policy} belongs to insertions; add --episode-type insertions.")
     led_by = (policy or "expert") if insertions else None
     with name_write_errors():
-        made, right = make_dataset(trials, out, command, format, led_by, partial(typer.echo, err=True))
+        made, right = make_dataset(trials, out, command, format, led_by, partial(typer.echo, err=True), pixels)
     typer.echo(f"{format_count(made, 'trial')}, {right} successful; {out / 'README.md'} describes them")
 
 

@@ -40,7 +40,7 @@ _COLUMNS = {
 _POSE_COLUMNS = {
     **dict.fromkeys(("scenario", "method"), ""),
     "trials": "d",
-    **dict.fromkeys(("success", "low", "high", "mssd", "mspd", "add"), ".1f"),
+    **dict.fromkeys(("success", "low", "high", "vsd", "mssd", "mspd", "add"), ".1f"),
 }
 """Columns of the scores of a pose estimator, with their formats."""
 

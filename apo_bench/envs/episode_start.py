@@ -113,18 +113,18 @@ class TrialStarts(NamedTuple):
             config.robot_error,
             simulated.layout.poses,
             joint,
-            self._state_error(made.plan, start, joint, config.actions),
+            self._state_error(made.plan, start, joint, config.probing is not None),
         )
 
-    def _state_error(self, plan: Plan, start: Start, joint: Array, actions: tuple[str, ...] = ()) -> Array:
+    def _state_error(self, plan: Plan, start: Start, joint: Array, probes: bool = False) -> Array:
         """Return the stated covariance of the held part relative to its hole, (6, 6), as in `EpisodeStart`.
 
         Args:
-            actions: The probing actions of the robot.
+            probes: Whether the robot probes.
         """
         sigmas = parse_robot_error(self.robot.assumed or NO_ROBOT_ERROR)
         errors = RobotErrors(self.scene, sigmas, len(plan.target_poses))
-        moves = plan_moves(plan, self.scene, True, actions)
+        moves = plan_moves(plan, self.scene, True, probes)
         return state_relative_error(errors, plan, moves, start.operation, start.grip, joint)
 
     def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:

@@ -50,6 +50,14 @@ class ImageConfig(FileTable, frozen=True):
     depth_noise_mm: Annotated[
         _Size, Meta(description="Noise of a depth pixel at 1 m, in mm (1 sigma); grows with the squared depth.")
     ] = 1.0
+    detection_error_px: Annotated[
+        _Size, Meta(description="Error of position and size of the default detections, in pixels (1 sigma).")
+    ] = 0.0
+    video_hz: Annotated[
+        float,
+        Meta(ge=0.0, le=50.0, description="Images between operations for each second, to track parts; 0: none."),
+    ] = 0.0
+    marks: Annotated[bool, Meta(description="Print coloured marks on the parts, so that their faces differ.")] = False
     no_rgb: Annotated[bool, Meta(description="Write depth and masks only, which needs no graphics.")] = False
     randomise: Annotated[bool, Meta(description="Vary camera poses, lights and table colours by trial.")] = False
 
@@ -121,6 +129,16 @@ def find_images(path: Path) -> Path:
         f"'{path}' lies in no data set of images; move it into the folder that `apo-bench dataset make --format bop` "
         f"wrote, which holds {DESCRIPTION}."
     )
+
+
+def list_image_files(results: Path) -> tuple[Path, ...]:
+    """The files of a data set of images without which its results file cannot be read: trials and cameras.
+
+    Raises:
+        InputError: The results file lies in no data set of images.
+    """
+    folder = find_images(results)
+    return folder / DESCRIPTION, *sorted(folder.glob(f"*/*/{CAMERAS}"))
 
 
 class PublishedCamera(msgspec.Struct, frozen=True):

@@ -26,8 +26,8 @@ from apo_bench.geometry.flips import Flips, find_approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, count_sides, find_distinct_directions, make_cylinder_hull
 from apo_bench.geometry.mating import Mate, measure_angle, measure_mate
 from apo_bench.geometry.meshes import build_union_mesh
+from apo_bench.geometry.pad_rays import FINGER_CLEARANCE_M
 from apo_bench.geometry.pads import (
-    FINGER_CLEARANCE_M,
     PAD_M,
     PadPlace,
     find_holds,

@@ -39,15 +39,12 @@ class Flips(NamedTuple):
 
 
 @remember
-def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Flips:
-    """The rotations by 90 and 180 degrees after which a solid covers at least a given share of its own volume.
+def find_approximate_symmetries(solid: Solid) -> Flips:
+    """The rotations by 90 and 180 degrees after which a solid covers at least `LEAST_SHARE` of its own volume.
 
     The axes go through the centre of volume, along the axes of the frame, or along the principal axes where these
     differ. The share is measured at about 500 points, so within about 0.04. Exact symmetries are kept and marked. Of a
     part of revolution only one half turn that swaps its ends is tried: no contact depends on turns about its axis.
-
-    Args:
-        least_share: From 0 to 1.
     """
     points, weights = _sample_points(solid)
     revolution = find_revolution(solid)
@@ -64,7 +61,7 @@ def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) 
     # Share = volume of the points that lie in the part after the turn, over that of all points; exact turns have 1.
     covered = np.any([_find_inside(piece, turned_points) for piece in solid.pieces], axis=0)
     shares[~exact] = covered.reshape(-1, len(points)) @ weights / weights.sum()
-    kept = shares >= least_share
+    kept = shares >= LEAST_SHARE
     flips = Flips(turns[kept], shares[kept], exact[kept])
     for array in flips:
         array.flags.writeable = False

@@ -7,33 +7,34 @@ In this file `up` is the vertical, `across` the level direction along which the 
 On these axes t is the coordinate along `along`, h the one along `up`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import collect_corners, intersect_rays
 from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.pad_rays import (
+    FINGER_CLEARANCE_M,
+    RAY_SPACING_M,
+    PadRays,
+    blocks_finger,
+    cast_ray_grid,
+    list_grid_coordinates,
+    merge_narrow_gaps,
+)
 from apo_bench.geometry.polygon import find_plane_across
 from apo_bench.geometry.solid import Piece, Solid, measure_extent
 
 PAD_M = (0.016, 0.010, 0.026)
 """Extent of a pad from the point between the tips: to each side, down and up, [m]."""
-_FINGER_THICKNESS_M = 0.012
-"""Thickness of a finger along the closing direction, [m]."""
-FINGER_CLEARANCE_M = 0.012
-"""Free width that a finger needs next to the held surface, beyond its own thickness, to come down and open, [m]."""
 _PALM_HEIGHT_M = 0.060
 """Height of the palm above the tips, [m]: the part may reach at most so far above them."""
 _LEAST_TIP_HEIGHT_M = 0.0115
 """Least height of the tips above the lowest point of the part, [m], so that the pads clear what the part stands on."""
-_RAY_SPACING_M = 0.003
-"""Spacing of the rays, [m]."""
 _FINE_SPACING_M = 0.001
-"""Spacing of the rows of rays where `_RAY_SPACING_M` finds no hold, [m], as on a thin flange; also least length of a
+"""Spacing of the rows of rays where `RAY_SPACING_M` finds no hold, [m], as on a thin flange; also least length of a
 pinch."""
 _PRESSED_DEPTH_M = 1e-4
 """Surfaces that lie at most so far behind the outermost one are pressed by the pad too, [m]."""
@@ -43,8 +44,6 @@ _PINCH_HEIGHT_M = 0.006
 """Tips higher than this over the top of the part pinch its upper edge, [m]: denser rays, shorter pressed lines."""
 _PINCH_SPACING_M = 0.0005
 """Spacing of the rows of rays for a pinch, [m]."""
-_ROUNDING_M = 1e-6
-"""Slack when rays are matched to the extent of a piece, [m]."""
 _HEIGHT_SLACK_M = 1e-8
 """Slack when heights of tips are compared with their limits, [m]."""
 _PERPENDICULAR = 1e-3
@@ -68,19 +67,6 @@ class PadPlace(NamedTuple):
     """Half the width of what is held, along `across`."""
 
 
-class _Rays(NamedTuple):
-    """A grid of r parallel level rays, and the intervals along each in which it passes through pieces, [m]."""
-
-    t: Array
-    """Coordinate of each ray along up x across, (r,)."""
-    h: Array
-    """Height of each ray, (r,)."""
-    low: Array
-    """Coordinates along the ray at which it enters pieces, ascending, (r, m); padded with inf."""
-    high: Array
-    """Coordinates at which it leaves the same pieces, (r, m); padded with -inf."""
-
-
 def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> tuple[float, float] | None:
     """Measure the material between two pads that close on a point.
 
@@ -100,11 +86,11 @@ def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up
     side, down, up_m = PAD_M
     t = float(point @ along)
     h = float(point @ up)
-    columns = _grid_coordinates(t - side, t + side, _axes_of_cylinders(pieces, along, t - side, t + side))
-    rows = _grid_coordinates(h - down, h + up_m, _axes_of_cylinders(pieces, up, h - down, h + up_m))
-    rays = _cast_ray_grid(pieces, across, up, columns, rows)
+    columns = list_grid_coordinates(t - side, t + side, _axes_of_cylinders(pieces, along, t - side, t + side))
+    rows = list_grid_coordinates(h - down, h + up_m, _axes_of_cylinders(pieces, up, h - down, h + up_m))
+    rays = cast_ray_grid(pieces, across, up, columns, rows)
     center = float(point @ across)
-    spans = _merge_narrow_gaps(rays, np.ones(len(rays.t), dtype=np.bool_))
+    spans = merge_narrow_gaps(rays, np.ones(len(rays.t), dtype=np.bool_))
     begins = [low for low, _ in spans if low < center]
     ends = [high for _, high in spans if high > center]
     return (begins[-1] - center, ends[0] - center) if begins and ends else None
@@ -143,7 +129,7 @@ def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -
     arguments = solid, tuple(map(float, up)), opening_m, over_m
     if over_m > _PINCH_HEIGHT_M:
         return _search_holds(*arguments, _PINCH_SPACING_M)
-    return _search_holds(*arguments, _RAY_SPACING_M) or _search_holds(*arguments, _FINE_SPACING_M)
+    return _search_holds(*arguments, RAY_SPACING_M) or _search_holds(*arguments, _FINE_SPACING_M)
 
 
 def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: float) -> bool:
@@ -159,14 +145,14 @@ def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: flo
     t, h, center = (float(point @ axis) for axis in (along, up, across))
     # First exactly the pad, then a margin around it: material just below the pads may join what they hold, or block
     # them, so either answer is accepted.
-    for margin in (0.0, _RAY_SPACING_M):
+    for margin in (0.0, RAY_SPACING_M):
         ends = (t - PAD_M[0] - margin, t + PAD_M[0] + margin), (h - PAD_M[1] - margin, h + PAD_M[2])
         columns, rows = (
-            _grid_coordinates(*range_m, [middle, *_axes_of_round_faces(solid, axis, *range_m)], _PINCH_SPACING_M)
+            list_grid_coordinates(*range_m, [middle, *_axes_of_round_faces(solid, axis, *range_m)], _PINCH_SPACING_M)
             for range_m, middle, axis in zip(ends, (t, h), (along, up), strict=True)
         )
         intervals = _list_holdable_intervals(
-            _cast_ray_grid(solid.pieces, across, up, columns, rows), t, h, opening_m, _FINE_SPACING_M
+            cast_ray_grid(solid.pieces, across, up, columns, rows), t, h, opening_m, _FINE_SPACING_M
         )
         if any(low < center < high for low, high, _ in intervals):
             return True
@@ -198,19 +184,19 @@ def _search_holds(
     # The preferred height, unless the pads would touch the ground or the palm the part there.
     best_height = max(bottom + _PREFERRED_HEIGHT * (top - bottom), bottom + _LEAST_TIP_HEIGHT_M, top - _PALM_HEIGHT_M)
     least_length, step = (
-        (_LEAST_LINE_M, _RAY_SPACING_M) if over_m <= _PINCH_HEIGHT_M else (_FINE_SPACING_M, _PINCH_SPACING_M)
+        (_LEAST_LINE_M, RAY_SPACING_M) if over_m <= _PINCH_HEIGHT_M else (_FINE_SPACING_M, _PINCH_SPACING_M)
     )
-    heights = _grid_coordinates(bottom, max(top + over_m, best_height), [best_height], step)
+    heights = list_grid_coordinates(bottom, max(top + over_m, best_height), [best_height], step)
     tips = heights[heights >= max(bottom + _LEAST_TIP_HEIGHT_M, top - _PALM_HEIGHT_M) - _HEIGHT_SLACK_M]
     candidates: list[tuple[float, PadPlace]] = []
     for across in _closing_directions(solid, up):
         along = np.cross(up, across)
         low, high = measure_extent(solid.pieces, along)
-        t = _grid_coordinates(
+        t = list_grid_coordinates(
             low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _PERPENDICULAR]
         )
         shaft_heights = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _PERPENDICULAR]
-        rays = _cast_ray_grid(solid.pieces, across, up, t, _grid_coordinates(bottom, top, shaft_heights, ray_m))
+        rays = cast_ray_grid(solid.pieces, across, up, t, list_grid_coordinates(bottom, top, shaft_heights, ray_m))
         for tip in tips:
             for column in t:
                 for low, high, is_line in _list_holdable_intervals(rays, column, tip, opening_m, least_length):
@@ -245,93 +231,8 @@ def _closing_directions(solid: Solid, up: Array) -> Iterator[Array]:
             yield np.asarray(direction * np.sign(direction[np.abs(direction).argmax()]) + 0.0)
 
 
-def _grid_coordinates(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_SPACING_M) -> Array:
-    """Coordinates of grid lines from just inside `low` to just inside `high`, sorted, (k,), [m].
-
-    Args:
-        also: Further coordinates to include, such as those of axes of shafts.
-        ray_m: Largest spacing; there are at least nine lines, and one of them is the middle.
-    """
-    middle = (low + high) / 2
-    reach = (high - low) / 2 - 1e-6
-    n = max(4, int(np.ceil(reach / ray_m)))
-    return np.unique(np.round(np.append(middle + np.linspace(-reach, reach, 2 * n + 1), also), 9))
-
-
-def _cast_ray_grid(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
-    """Cast a grid of rays along `across` through the pieces.
-
-    Args:
-        t, h: Coordinates of the columns and rows of the grid, ascending, [m].
-    """
-    along = np.cross(up, across)
-    corners, first = collect_corners(pieces)
-    (t0, t1), (h0, h1) = (
-        _grid_range_of_pieces(places, corners @ axis, first) for places, axis in ((t, along), (h, up))
-    )
-    hit_pieces = np.flatnonzero((t0 < t1) & (h0 < h1))  # pieces that at least one ray can hit
-    T, H = np.meshgrid(t, h)
-    start = T[..., None] * along + H[..., None] * up
-    number = np.arange(T.size).reshape(T.shape)
-    rays, lows, highs = [np.zeros(0, dtype=np.intp)], [np.zeros(0)], [np.zeros(0)]
-    for i in hit_pieces:
-        window = slice(h0[i], h1[i]), slice(t0[i], t1[i])
-        enter, leave = intersect_rays(pieces[i].planes, start[window].reshape(-1, 3), across)
-        hit = np.isfinite(enter)
-        rays.append(number[window].ravel()[hit])
-        lows.append(enter[hit])
-        highs.append(leave[hit])
-    # Pack the passages of each ray into the first columns of its row: most rays pass through few of many pieces.
-    ray, low, high = (np.concatenate(each) for each in (rays, lows, highs))
-    by_entry = np.lexsort((low, ray))
-    ray = ray[by_entry]
-    passage = np.arange(len(ray)) - np.searchsorted(ray, ray)  # number of a passage within its ray
-    ends = [np.full((T.size, int(passage.max(initial=0)) + 1), empty) for empty in (np.inf, -np.inf)]
-    for end, values in zip(ends, (low, high), strict=True):
-        end[ray, passage] = values[by_entry]
-    return _Rays(T.ravel(), H.ravel(), *ends)
-
-
-def _grid_range_of_pieces(
-    grid: Array, coordinates: Array, first_corner: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """For each piece, the range of grid coordinates inside its extent on an axis.
-
-    Args:
-        grid: Grid coordinates, ascending, [m].
-        coordinates: Coordinates of the corners of all pieces on the axis, piece by piece, [m].
-        first_corner: Index of the first corner of each piece.
-
-    Returns:
-        Index of the first grid coordinate of each piece, and the index after its last.
-    """
-    low = np.searchsorted(grid, np.minimum.reduceat(coordinates, first_corner) - _ROUNDING_M)
-    return low, np.searchsorted(grid, np.maximum.reduceat(coordinates, first_corner) + _ROUNDING_M)
-
-
-def _merge_narrow_gaps(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Intervals of material along the rays, (begin, end), ascending, [m]; gaps too narrow for a finger are closed.
-
-    Args:
-        within: The rays to consider, (r,).
-    """
-    low = rays.low[within]
-    high = rays.high[within]
-    is_hit = np.isfinite(low)
-    if not is_hit.any():
-        return []
-    order = np.argsort(low[is_hit])
-    low = low[is_hit][order]
-    farthest = np.maximum.accumulate(high[is_hit][order])
-    # A finger fits into a gap that is wider than the finger and its distance from the surface.
-    is_gap = low[1:] >= farthest[:-1] + _FINGER_THICKNESS_M + FINGER_CLEARANCE_M
-    begins = np.append(low[0], low[1:][is_gap])
-    ends = np.append(farthest[:-1][is_gap], farthest[-1])
-    return list(zip(begins.tolist(), ends.tolist(), strict=True))
-
-
 def _list_holdable_intervals(
-    rays: _Rays, t: float, h: float, opening_m: float, least_length: float
+    rays: PadRays, t: float, h: float, opening_m: float, least_length: float
 ) -> Iterator[tuple[float, float, bool]]:
     """Intervals that pads with their tips at (t, h) can hold: (begin, end, line), [m], `line` if touched along one
     only.
@@ -342,12 +243,12 @@ def _list_holdable_intervals(
     """
     side, down, up_m = PAD_M
     # Rays at the fingers, from a margin below the pads upwards; those of them at pad height; those on the pad itself.
-    at_fingers = (np.abs(rays.t - t) <= side + _RAY_SPACING_M) & (rays.h >= h - down - _RAY_SPACING_M)
+    at_fingers = (np.abs(rays.t - t) <= side + RAY_SPACING_M) & (rays.h >= h - down - RAY_SPACING_M)
     at_pads = at_fingers & (rays.h <= h + up_m)
     on_pad = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[at_pads]
     enter, leave = rays.low[at_pads], rays.high[at_pads]
-    for low, high in _merge_narrow_gaps(rays, at_pads):
-        if (high - low) / 2 + FINGER_CLEARANCE_M / 2 > opening_m or _blocks_finger(rays, at_fingers, low, high):
+    for low, high in merge_narrow_gaps(rays, at_pads):
+        if (high - low) / 2 + FINGER_CLEARANCE_M / 2 > opening_m or blocks_finger(rays, at_fingers, low, high):
             continue
         # First and last surface of each ray within this interval of material; passages outside count as NaN.
         inside = np.where((enter >= low - 1e-9) & (leave <= high + 1e-9), 1.0, np.nan)
@@ -360,15 +261,3 @@ def _list_holdable_intervals(
             lengths = [float(np.ptp(places[at_pads][pressed])) for places in (rays.t, rays.h)]
             if max(lengths) >= least_length:
                 yield low, high, min(lengths) < _LEAST_LINE_M
-
-
-def _blocks_finger(rays: _Rays, at_fingers: NDArray[np.bool_], low: float, high: float) -> bool:
-    """Whether the part itself blocks a finger next to the held interval, either open or on its way down.
-
-    Args:
-        at_fingers: The rays at the fingers and above them, (r,).
-        low, high: The held interval along the rays, [m].
-    """
-    needed = _FINGER_THICKNESS_M + FINGER_CLEARANCE_M
-    sides = (low - needed, low - 1e-6), (high + 1e-6, high + needed)
-    return any(bool(((rays.low[at_fingers] < end) & (rays.high[at_fingers] > begin)).any()) for begin, end in sides)

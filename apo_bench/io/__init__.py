@@ -1,6 +1,6 @@
 """Safe reading and writing of files, tables, streams and processes."""
 
-from apo_bench.io.csv_tables import Columns, CsvRow, check_separator, read_csv, write_csv
+from apo_bench.io.csv_tables import Columns, CsvRow, read_csv, write_csv
 from apo_bench.io.documents import (
     FileTable,
     Finite,
@@ -43,7 +43,6 @@ __all__ = (
     "add_the",
     "align_columns",
     "check_quaternion",
-    "check_separator",
     "check_target",
     "clean",
     "convert_typed",

@@ -22,6 +22,8 @@ class SettingInfo:
     """Checks a name and returns its canonical form."""
     option: str = ""
     """Command-line option without leading dashes; default: the name of the setting."""
+    heading: str = ""
+    """Heading of its option on the help pages of `run` and `sweep`."""
     scale: float = 1.0
     usual: str = ""
     """Text about the default in the help; empty for the default itself."""

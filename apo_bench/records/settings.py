@@ -1,4 +1,7 @@
-"""The settings of a trial, each stated once: columns, sweep axes, file keys, options and tables derive from them."""
+"""The settings of a trial, each stated once: columns, sweep axes, file keys, options and tables derive from them.
+
+The file is long because all that is stated about a setting stands at its field.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -44,6 +47,7 @@ TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
 NOISE_LEVEL = SettingInfo(
     "Standard deviation of the observed poses per axis, in mm and in degrees",
     option="noise-level",
+    heading="Observation",
     usual="1",
     axis=True,
     swept=(0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0),
@@ -72,6 +76,7 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Standard deviation of the observed positions per axis, in mm",
+            heading="Observation",
             usual="the noise level",
             key=True,
             drawn=True,
@@ -82,6 +87,7 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Standard deviation of the observed rotation vectors per axis, in degrees",
+            heading="Observation",
             usual="the noise level",
             key=True,
             drawn=True,
@@ -93,6 +99,7 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Factor on the human error that the scenario states; 0 is an ideal human",
+            heading="Task and robot",
             key=True,
             drawn=True,
             axis=True,
@@ -103,6 +110,7 @@ class TrialConfig:
         default=0.25,
         metadata=about(
             "Clearance per side between parts that fit, in mm",
+            heading="Task and robot",
             usual="the scenario's",
             key=True,
             axis=True,
@@ -115,6 +123,7 @@ class TrialConfig:
         metadata=about(
             "Where observed poses come from: noise-model, or depth-camera (estimated from simulated depth images; the "
             "noise level is then in mm per ray)",
+            heading="Observation",
             choices=get_args(PoseSource),
             axis=True,
         ),
@@ -126,6 +135,7 @@ class TrialConfig:
         metadata=about(
             "Noise model: a name from `apo-bench noise list`, FILE.toml, empirical:FILE.csv, poses:FILE.csv (of images "
             "of the trials), or package.module:name",
+            heading="Observation",
             key=True,
             axis=True,
         ),
@@ -135,6 +145,7 @@ class TrialConfig:
         default="friction",
         metadata=about(
             "How the gripper holds parts: friction, or weld for an ideal gripper",
+            heading="Task and robot",
             choices=("friction", "weld"),
             key=True,
             axis=True,
@@ -147,6 +158,7 @@ class TrialConfig:
         metadata=about(
             "Robot arm: a name from `apo-bench arm list`, FILE.toml, menagerie:NAME (of MuJoCo Menagerie), "
             "robosuite:NAME, or package.module:name",
+            heading="Task and robot",
             shared=True,
             scene=True,
         ),
@@ -158,6 +170,7 @@ class TrialConfig:
             "Standard deviations of the robot's own errors: none, hand_eye:1/0.2 (mm/degrees), joints:0.05 (degrees), "
             "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), sag:0.5 (mm), base_tilt:0.1 (degrees), finger:0.5 (mm), "
             "ft_drift:1 (N a minute), or several joined by +",
+            heading="Task and robot",
             spelled=normalise_robot_error,
             key=True,
             axis=True,
@@ -169,6 +182,7 @@ class TrialConfig:
         metadata=about(
             "Where the corrector's contacts come from: given (correct), detected, detected-jointly, or wrong ones: "
             "false-negative, false-positive, face-offset:3mm",
+            heading="Correction",
             spelled=check_contact_source,
             key=True,
             axis=True,
@@ -182,6 +196,7 @@ class TrialConfig:
             "contact-robust or another corrector (`apo-bench method list`), package.module:name, uncorrected (observed "
             "poses), nominal (poses of the scenario file), oracle (true poses), spiral-search; +spiral and +probe add "
             "a spiral search and probing",
+            heading="Correction",
             spelled=check_method,
             key=True,
             axis=True,
@@ -195,6 +210,7 @@ class TrialConfig:
         default=0,
         metadata=about(
             "How often a corrector may observe operations again",
+            heading="Correction",
             key=True,
             axis=True,
         ),
@@ -205,6 +221,7 @@ class TrialConfig:
         metadata=about(
             "Force-torque sensor of a robot that probes: ideal, wrist, wrist-coarse, joint-torque, or its noise in N "
             "and Nm, 0.1/0.005",
+            heading="Robot that probes",
             spelled=normalise_ft_sensor,
             key=True,
             axis=True,
@@ -217,6 +234,7 @@ class TrialConfig:
         metadata=about(
             "Robot error that a robot that probes assumes: matched (the standard deviations of --robot-error), "
             "unknown, or standard deviations",
+            heading="Robot that probes",
             spelled=normalise_assumed_robot_error,
             key=True,
             axis=True,
@@ -228,23 +246,31 @@ class TrialConfig:
         default=0.0,
         metadata=about(
             "Abstain from plans whose predicted success is lower; 0 executes every plan",
+            heading="Correction",
             key=True,
             axis=True,
         ),
     )
     """A plan with a lower `predicted_success` is not executed, and does not count as a success."""
-    seed: Seed = field(default=0, metadata=about("Number of the trial", key=True))
+    seed: Seed = field(default=0, metadata=about("Number of the trial", heading="Trials", key=True))
     """Number of the trial: at the same seed, all methods have the same layout, demonstration and noise."""
     secret_seed: SecretSeed | None = field(
         default=None,
         repr=False,
-        metadata=about("File with the secret seed of the sweep", option="secret-seed-file", usual="none", drawn=True),
+        metadata=about(
+            "File with the secret seed of the sweep",
+            heading="Trials",
+            option="secret-seed-file",
+            usual="none",
+            drawn=True,
+        ),
     )
     """Secret that enters every random stream; None for a trial that anyone can draw. A record has its hash."""
     timestep_s: TimestepS = field(
         default=0.001,
         metadata=about(
             "Time step of the physics, in ms; smaller is slower and more exact",
+            heading="Simulation",
             option="timestep-ms",
             scale=1e-3,
             shared=True,
@@ -256,6 +282,7 @@ class TrialConfig:
         default="full",
         metadata=about(
             "full, or near-contact: simulate only the part of each motion in which parts may touch",
+            heading="Simulation",
             choices=get_args(Fidelity),
             shared=True,
         ),

@@ -15,7 +15,8 @@ from apo_bench.assembly import Correction, Observation, Plan, build_contact_equa
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.first_failure import predict_failure
-from apo_bench.planning.prediction.plan_measures import Measure, measure_plan
+from apo_bench.planning.prediction.measure import Measure
+from apo_bench.planning.prediction.plan_measures import measure_plan
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.execution import in_reach
 from apo_bench.simulation.scene import Scene, build_scene

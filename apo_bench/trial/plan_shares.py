@@ -13,13 +13,9 @@ from scipy.special import ndtr
 from apo_bench.assembly import Assembly, Contact, Plan, Poses, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.judging.finished_assembly import compute_least_overlaps
-from apo_bench.planning.prediction.plan_measures import (
-    ArmMove,
-    DrawnMeasure,
-    Measure,
-    measure_drawn_plans,
-    measure_plan,
-)
+from apo_bench.planning.prediction.arm_move import ArmMove
+from apo_bench.planning.prediction.measure import DrawnMeasure, Measure
+from apo_bench.planning.prediction.plan_measures import measure_drawn_plans, measure_plan
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.contact_errors import ContactError, Judged, share_within
 

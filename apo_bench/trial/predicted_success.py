@@ -23,9 +23,7 @@ from scipy.special import ndtri
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.prediction.plan_measures import (
-    ArmMove,
-)
+from apo_bench.planning.prediction.arm_move import ArmMove
 from apo_bench.records import GIVEN, NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.contact_errors import (

@@ -14,7 +14,6 @@ from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.rest_poses import predict_rest_poses
 from apo_bench.simulation.execution import Grip, compute_transferred_poses, plan_moves, solve_key_angles
-from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
@@ -47,7 +46,7 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     """
     resting = plan.start
     states = list[Poses]()
-    for move in plan_moves(plan, scene, spiral, ()):
+    for move in plan_moves(plan, scene, spiral):
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]
@@ -82,7 +81,7 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
         slip_deg: Standard deviation of the rotation of a part in the hand.
     """
     left = np.array(error.in_hand)
-    for move in plan_moves(plan, scene, True, PROBING_ACTIONS):
+    for move in plan_moves(plan, scene, True, True):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
         if t.flat is not None:

@@ -39,7 +39,7 @@ from apo_bench.records import (
 from apo_bench.records.run.validation import describe_unwritable
 from apo_bench.scenario import Scenario, list_scenario_names
 from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
-from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
+from apo_bench.simulation.execution.probing.config import ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, use_detected_contacts
@@ -300,7 +300,6 @@ def probing_config(
     assumed: str | None,
     seed: tuple[int, ...],
     ft_sensor: str = USUAL_FT_SENSOR,
-    actions: tuple[str, ...] = PROBING_ACTIONS,
 ) -> ProbingConfig:
     """The configuration of a robot that probes: assumed standard deviations of its errors, never the errors themselves.
 
@@ -308,7 +307,6 @@ def probing_config(
         assumed: Standard deviations, as in a record; None: default ones for an unknown robot.
         seed: Seed of the noise of the force-torque sensor.
         ft_sensor: As in a record.
-        actions: Of `PROBING_ACTIONS`.
 
     Raises:
         InputError: An unknown kind of error, or a number that is not allowed.
@@ -316,7 +314,7 @@ def probing_config(
     sigmas = UNKNOWN if assumed is None else parse_robot_error(assumed)
     middle = plan.target_poses[:, :3, 3].mean(axis=0)
     estimate = make_prior_estimate(sigmas, len(scene.arm.joints), middle, np.array(scene.arm.base), sigmas.sag_mm > 0.0)
-    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions, 0.5e-3 * sigmas.finger_mm)
+    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, 0.5e-3 * sigmas.finger_mm)
 
 
 def record_trial(

@@ -41,15 +41,12 @@ def explain_missing_browser() -> str:
     return ""
 
 
-def serve_rollout(
-    rollout: Rollout, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False
-) -> None:
-    """Serve a rollout until `ends` returns true, or Ctrl-C.
+def serve_rollout(rollout: Rollout, port: int, say: Callable[[str], None]) -> None:
+    """Serve a rollout until Ctrl-C.
 
     Args:
         port: TCP port on this machine.
         say: Called once with a sentence that states the address.
-        ends: Called before each update of the page.
 
     Raises:
         InputError: The port is taken or not allowed.
@@ -58,7 +55,7 @@ def serve_rollout(
     try:
         say(f"Open {page.address} in a browser on this machine; Ctrl-C ends it.")
         before = time.monotonic()
-        while not ends():
+        while True:
             page.draw()
             time.sleep(PICTURE_S)
             now = time.monotonic()

@@ -124,9 +124,6 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
     return {"schema": _SCHEMA, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
 
 
-"""Format a step as the cells of `_HEADS`."""
-
-
 def _list_cells(line: PlanLine) -> tuple[str, ...]:
     """Return the cells of a step, in the order of `_HEADS`."""
     # main part, and the parts that it carries

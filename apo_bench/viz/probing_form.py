@@ -25,7 +25,6 @@ from apo_bench.simulation.execution import (
     search_laws,
 )
 from apo_bench.simulation.execution.probing import lay_flat, touching
-from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import (
     OPENING_M,
     TouchPlace,
@@ -89,9 +88,7 @@ def make_probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [
-            _make_step_form(move, scene, frames, filtered) for move in plan_moves(plan, scene, True, PROBING_ACTIONS)
-        ],
+        "steps": [_make_step_form(move, scene, frames, filtered) for move in plan_moves(plan, scene, True, True)],
     }
 
 

@@ -20,7 +20,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.assembly import Outcome
-from apo_bench.records import KEY, RECORD_SCHEMA
+from apo_bench.records import KEY, RECORD_SCHEMA, TrialConfig, list_setting_columns
 from apo_bench.records.run.run_file import make_run_record
 from apo_bench.records.run.run_folder import RunFolder, read_records
 from apo_bench.trial.fingerprint import list_versions
@@ -38,23 +38,14 @@ def run(**changed: Any) -> dict[str, Any]:
 
 
 def row(seed: int) -> dict[str, Any]:
-    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0)
-    key = (*key, "wrist", "matched", 0.0, seed)
     ended = {"demonstration": "ok", **end_record(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_time_s": 20.0, "extra_steps": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
-    alike = {
-        "env_id": "APOReplay-v0",
-        "arm": "six_axis",
-        "pose_source": "noise-model",
-        "timestep_s": 0.001,
-        "fidelity": "full",
-    }
     return {
         "schema": RECORD_SCHEMA,
+        "env_id": "APOReplay-v0",
         "config_hash": "ab",
-        **alike,
-        **dict(zip(KEY, key, strict=True)),
+        **list_setting_columns(TrialConfig("block_on_block", seed=seed), "block_on_block"),
         **ended,
         "final_poses": reached,
     }

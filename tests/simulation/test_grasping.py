@@ -49,7 +49,7 @@ def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float,
 def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
     """Example of Fig. 6, step 5: no single grasp passes the cubes, so the grip changes between them."""
     plan = nominal(pockets)
-    move = plan_moves(plan, pockets, False, ())[4]
+    move = plan_moves(plan, pockets, False)[4]
     first, second = move.transfer.grips
     left = move.transfer.into.left
     assert left is not None
@@ -68,7 +68,7 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
 
 def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
     schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
-    done = plan_moves(nominal(fixture, schedule), fixture, False, ())
+    done = plan_moves(nominal(fixture, schedule), fixture, False)
     towards = fixture_side(fixture)
     (side,) = done[2].transfer.sides
     np.testing.assert_allclose(side, towards, atol=1e-9)
@@ -121,7 +121,7 @@ def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
     for yaw in (0.2, np.pi):  # one of them is reached the other way round
         layout = place_layout(scene.scenario, 0.1, 0.0, yaw)
         plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
-        (move,) = plan_moves(plan, scene, False, ())
+        (move,) = plan_moves(plan, scene, False)
         np.testing.assert_allclose(move.transfer.grips[0].T_part_tip[:3, 2], ahead, atol=1e-12)
         assert is_tilted(move.transfer.T_world_start @ move.transfer.grips[0].T_part_tip)
     layout = place_layout(scene.scenario, 0.1, 0.0, 0.2)

@@ -1,5 +1,6 @@
 """Scenes of convex pieces: their geoms are where the part has them, and round parts come to rest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -51,6 +52,17 @@ def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
         )
         assert apart.min(axis=0).max() < 1e-8  # meshes are kept in single precision
         assert apart.min(axis=1).max() < 1e-8
+
+
+def test_a_piece_that_vanished_behind_a_fit_face_is_not_simulated(tmp_path: Path):
+    given = peg_in_hole(tmp_path)
+    solids = given.assembly.solids
+    gone, *left = solids["plate"].pieces
+    fewer = replace(given.assembly, solids={**solids, "plate": replace(solids["plate"], pieces=tuple(left))})
+    model = build_scene(replace(given, assembly=fewer)).work.model
+    names = [model.geom(i).name for i in range(model.ngeom)]
+    assert f"plate/{gone.name}" not in names
+    assert f"plate/{left[0].name}" in names
 
 
 @pytest.mark.parametrize("part", ["peg", "plate"])

@@ -14,7 +14,6 @@ from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import place_layout
 from apo_bench.simulation.execution.prepare import plan_moves
-from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.viz.probing_form import make_probing_form
@@ -74,7 +73,7 @@ def test_touches_are_where_the_simulated_hand_touches(name: str, frames: str) ->
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
     for one, (step, t) in zip(
-        form(name, frames)["steps"], plan_moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
+        form(name, frames)["steps"], plan_moves(plan(name), scene(name), True, True), strict=True
     ):
         assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
         for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):

@@ -34,7 +34,6 @@ from apo_bench.benchmark.analysis.paired import PairedComparison, compute_tango_
 from apo_bench.benchmark.analysis.prediction import tabulate_confusion
 from apo_bench.benchmark.analysis.probing import tabulate_probing
 from apo_bench.benchmark.analysis.rates import (
-    NOT_EXECUTED,
     ConditionResult,
     Interval,
     Rate,
@@ -64,7 +63,6 @@ __all__ = (
     "ALL",
     "CONDITION_FIELDS",
     "FEWEST_SEEDS",
-    "NOT_EXECUTED",
     "Condition",
     "ConditionResult",
     "Contrast",

@@ -14,9 +14,9 @@ def format_percent(rate: float | None, digits: int = 1) -> str:
     return f"< {least:.{digits}f} %" if rate > 0.0 and float(text) == 0.0 else f"{text} %"
 
 
-def format_percent_interval(interval: Interval, digits: int = 1) -> str:
+def format_percent_interval(interval: Interval) -> str:
     """Format an interval: `91.5 to 99.0 %`."""
-    return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
+    return f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %"
 
 
 def format_signed(x: float, digits: int) -> str:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from apo_bench import __version__
 from apo_bench.geometry import Array
 from apo_bench.io import format_count, write_file
@@ -45,6 +48,8 @@ class RecordedEpisode:
     """Column of the table of episodes -> its value for this episode; `success` is among them."""
     robot: Mapping[str, Array] = field(default_factory=dict)
     """Further fields that are no observation -> (T + 1, k), as the observations."""
+    images: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    """Camera -> its images before each action, (T, height, width, 3)."""
     truncated: bool = False
     """Whether its time ran out, so that it is truncated and not terminated."""
 

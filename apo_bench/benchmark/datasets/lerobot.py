@@ -2,7 +2,7 @@
 
 The format is that of `huggingface/lerobot`, `src/lerobot/datasets`. `data` has the frames of all episodes, one row
 group per episode. `meta/episodes` describes each episode, with statistics. `meta/tasks.parquet` has the tasks with
-their words as the pandas index, and `meta/stats.json` the statistics of all frames.
+their words as the pandas index, and `meta/stats.json` the statistics of all frames. `videos` has the images.
 
 Needs the package pyarrow.
 """
@@ -18,7 +18,9 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, write_card
+from apo_bench.benchmark.datasets.episode_videos import VIDEO_PATH, EpisodeVideos
 from apo_bench.benchmark.datasets.episodes import KINDS
+from apo_bench.benchmark.datasets.lerobot_statistics import compute_statistics
 from apo_bench.geometry import Array
 from apo_bench.io import replace_file, write_columns, write_file
 
@@ -27,7 +29,6 @@ _CHUNK = 1000
 """Number of files in a folder."""
 _FRAMES_OF_A_FILE = 200_000
 """Frames after which a new file begins, some 60 MB."""
-_QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
 _TOGETHER = "observation.environment_state"
 """Name of an observation that joins several: policies of LeRobot use only the state, this and images."""
 _OWN = {  # columns of one number
@@ -83,6 +84,7 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     episodes: list[dict[str, Any]] = []
     files = frames = 0
     writer: Any = None
+    videos = EpisodeVideos(out, _CHUNK)
     with ExitStack() as opened:
         for e, rollout in enumerate(rollouts):
             n = len(rollout.actions)
@@ -99,17 +101,21 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
             writer.write_table(pa.table([_to_arrow(columns[each.name], each.type) for each in schema], schema=schema))
             of_episode = (e, [rollout.task], n, frames, frames + n, chunk, file, 0, 0)
             statistics = {
-                f"stats/{x}/{y}": z for x, column in columns.items() for y, z in _compute_statistics(column).items()
+                f"stats/{x}/{y}": z for x, column in columns.items() for y, z in compute_statistics(column).items()
             }
-            episodes.append({**dict(zip(_OF_EPISODE, of_episode, strict=True)), **rollout.more, **statistics})
+            line = dict(zip(_OF_EPISODE, of_episode, strict=True))
+            episodes.append({**line, **rollout.more, **statistics, **videos.write(rollout.images, e)})
             frames += n
     if not episodes:
         return 0, 0
-    _write_meta(out, about, fields, schema, tasks, episodes, frames)
+    _write_meta(out, about, fields, schema, tasks, episodes, frames, videos)
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
     of_episodes = {**_OF_EPISODE, **about.episodes}
-    write_card(about, out, counted, {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes})
+    tables: dict[str, Mapping[str, Any]] = {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes}
+    if videos.features:
+        tables["videos/*/*/*.mp4"] = dict.fromkeys(videos.features, "image of each frame")
+    write_card(about, out, counted, tables)
     return counted
 
 
@@ -144,14 +150,6 @@ def _to_arrow(column: Array, kind: Any) -> Any:
     return pa.array(column.ravel()).cast(kind)
 
 
-def _compute_statistics(column: Array) -> dict[str, list[float]]:
-    """Return the statistics of each number of a column, (T,) or (T, k), under LeRobot's names."""
-    x = np.asarray(column, dtype=np.float64).reshape(len(column), -1)
-    found = {"min": x.min(axis=0), "max": x.max(axis=0), "mean": x.mean(axis=0), "std": x.std(axis=0)}
-    found |= {f"q{round(100 * q):02d}": np.quantile(x, q, axis=0) for q in _QUANTILES}
-    return {**{name: values.tolist() for name, values in found.items()}, "count": [len(x)]}
-
-
 def _write_meta(
     out: Path,
     about: DatasetMetadata,
@@ -160,6 +158,7 @@ def _write_meta(
     tasks: Mapping[str, int],
     episodes: list[dict[str, Any]],
     frames: int,
+    videos: EpisodeVideos,
 ) -> None:
     """Write the folder `meta`: episodes, tasks, statistics, and the description `info.json`."""
     folder = out / "meta" / "episodes" / "chunk-000"
@@ -168,11 +167,11 @@ def _write_meta(
     columns = [[each[name] for each in episodes] for name in names]
     write_columns(names, columns, folder / "file-000.parquet", KINDS)
     _write_tasks(tasks, out / "meta" / "tasks.parquet")
-    statistics = {}
+    statistics: dict[str, Any] = videos.summarise()
     for name in schema.names if frames else ():
         column = parquet.read_table(out / "data", columns=[name])[name].combine_chunks()
         numbers = (column.flatten() if name in fields and len(fields[name].names) > 1 else column).to_numpy(False)
-        statistics[name] = _compute_statistics(numbers.reshape(frames, -1))
+        statistics[name] = compute_statistics(numbers.reshape(frames, -1))
     info = {
         "codebase_version": "v3.0",
         "robot_type": about.robot,
@@ -185,10 +184,11 @@ def _write_meta(
         "fps": FPS,
         "splits": {"train": f"0:{len(episodes)}"},
         "data_path": f"data/{_PLACE}",
-        "video_path": None,
+        "video_path": VIDEO_PATH if videos.features else None,
         "features": {
             **{n: {"dtype": "float32", "shape": [len(f.names)], "names": [*f.names]} for n, f in fields.items()},
             **{name: {"dtype": kind, "shape": [1], "names": None} for name, (kind, _) in _OWN.items()},
+            **videos.features,
         },
     }
     for name, content in (("info", info), ("stats", statistics)):

@@ -19,6 +19,7 @@ from apo_bench.benchmark.datasets.episodes import convert_replays, describe_repl
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
 from apo_bench.benchmark.sweeps.stop_signals import Check, stop_at_signals
 from apo_bench.envs.apo_insert import APOInsert
+from apo_bench.envs.insert_spaces import pixels_key
 from apo_bench.envs.insertion_progress import PHASES
 from apo_bench.envs.policies import POLICIES, MakePolicy, insert_env
 from apo_bench.envs.robot_state import STATE_NAMES, read_robot_state, stack_states
@@ -26,6 +27,7 @@ from apo_bench.errors import RAISED, InputError, missing_package, require, requi
 from apo_bench.io import has_parquet, write_file
 from apo_bench.names import resolve
 from apo_bench.records import TrialConfig
+from apo_bench.simulation.scene import check_film
 from apo_bench.trial.trial_stages import scene_of
 
 _FRAME = "insertion"  # the frame of the insertion axis
@@ -87,7 +89,11 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(  # column of the table of epi
 
 
 def record_insertions(
-    trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
+    trials: Sequence[TrialConfig],
+    policy: str,
+    command: str,
+    say: Callable[[str], None],
+    pixels: Sequence[str] = (),
 ) -> tuple[DatasetMetadata, Iterator[RecordedEpisode]]:
     """Let a policy insert parts, trial by trial.
 
@@ -97,6 +103,7 @@ def record_insertions(
             environment.
         command: The command line that makes the data set.
         say: Called with a sentence about each trial that fails before the operation.
+        pixels: Cameras whose images are recorded, as in `APOInsert-v0`.
 
     Returns:
         The metadata, and the episodes, which run when they are iterated.
@@ -105,12 +112,14 @@ def record_insertions(
         InputError: There is no such policy, or the environment does not take a setting.
     """
     make = resolve(policy, POLICIES, "policy")
-    env = insert_env(trials[0], policy)
+    env = insert_env(trials[0], policy, pixels=pixels)
     given = env.spec.kwargs if env.spec else {}
     defaults = {name: each.default for name, each in inspect.signature(APOInsert).parameters.items()}
     joints = (*env.scene.arm.joints, "opening")
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
-    fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
+    fields = {
+        name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items() if name in _FIELDS
+    }
     about = DatasetMetadata(
         name="insertions",
         summary="A robot holds a part before its hole, and a policy moves the tip until the hand opens, in "
@@ -128,17 +137,21 @@ def record_insertions(
         },
         arguments={name: x for name, x in {**defaults, **given}.items() if name != "scenario"},
     )
-    return about, _run_rollouts(trials, policy, make, say)
+    return about, _run_rollouts(trials, policy, make, say, pixels)
 
 
 def _run_rollouts(
-    trials: Iterable[TrialConfig], policy: str, make: MakePolicy, say: Callable[[str], None]
+    trials: Iterable[TrialConfig],
+    policy: str,
+    make: MakePolicy,
+    say: Callable[[str], None],
+    pixels: Sequence[str],
 ) -> Iterator[RecordedEpisode]:
     """Yield the episodes; a new environment is made for each new scenario."""
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
-            env = insert_env(trial, policy)
+            env = insert_env(trial, policy, pixels=pixels)
         try:
             seen, info = env.reset(seed=trial.seed, options={"trial": trial.seed})
         except InputError as error:
@@ -162,12 +175,13 @@ def _run_rollouts(
         facts = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
         yield RecordedEpisode(
             seed=trial.seed,
-            task=f"{scenario.title}: insert the part in the hand, the last one.",
-            observations={name: np.array([each[name] for each in observations]) for name in seen},
+            task=f"Insert the part in the hand: {scenario.title[0].lower()}{scenario.title[1:]}.",
+            observations={name: np.array([each[name] for each in observations]) for name in seen if name in _FIELDS},
             actions=np.array(actions),
             rewards=np.array(rewards),
             more={**facts, **{name: info[name] for name in ("success", "code", "sentence")}},
             robot=stack_states(states),
+            images={each: np.array([seen[pixels_key(each)] for seen in observations[:-1]]) for each in pixels},
             truncated=truncated,
         )
 
@@ -193,6 +207,7 @@ def make_dataset(
     form: str = "parquet",
     policy: str | None = None,
     say: Callable[[str], None] = print,
+    pixels: Sequence[str] = (),
 ) -> tuple[int, int]:
     """Run trials and write them, with a card `README.md`.
 
@@ -207,6 +222,7 @@ def make_dataset(
         form: One of `FORMATS`.
         policy: Policy that inserts parts; None records replays.
         say: Called with a sentence about each trial that makes no episode.
+        pixels: Cameras whose images are written as videos, `scene` or `wrist`; only for insertions as `lerobot`.
 
     Returns:
         The number of episodes, and the number of successes.
@@ -224,6 +240,9 @@ def make_dataset(
         form != "parquet" or policy is None,
         "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
+    if pixels:
+        require(form == "lerobot" and policy is not None, "images of cameras need insertions in the format lerobot.")
+        check_film(Path("episode.mp4"))
     if form == "minari":
         load_h5py()
     elif not has_parquet():
@@ -232,7 +251,7 @@ def make_dataset(
     ends: list[BaseException] = []  # the exceptions that ended the run early
     found: Iterator[Any]
     if policy is not None:
-        about, found = record_insertions(trials, policy, command, say)
+        about, found = record_insertions(trials, policy, command, say, pixels)
     else:
         scenes = {each.scenario: scene_of(each) for each in trials}
         about = describe_replays([*scenes.values()], command, trials[0].arm)

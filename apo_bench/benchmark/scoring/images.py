@@ -6,7 +6,7 @@ from typing import Any
 
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.analysis.rates import Rate
-from apo_bench.benchmark.scoring.pose_errors import PoseRecall, measure_recall
+from apo_bench.benchmark.scoring.pose_errors import RECALLS, PoseRecall, measure_recall
 from apo_bench.benchmark.sweeps.grid import SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.formats.bop_images import ImageDescription
@@ -48,14 +48,13 @@ def score_poses(
 
     Returns:
         For each scenario, and for all if there are several, and each method: `scenario`, `method`, `trials`,
-        `successes`, the rate `success` with its interval `low` to `high`, and recall of the poses, `mssd`, `mspd` and
-        `add`, in percent; a recall is None if the true poses are secret.
+        `successes`, the rate `success` with its interval `low` to `high`, and recall of the poses, `vsd`, `mssd`,
+        `mspd` and `add`, in percent; a recall is None if the true poses are secret.
 
     Raises:
         InputError: A file is missing, deviates from its format, or is of other images.
     """
-    name = f"{ESTIMATES}{Path(results).resolve()}"
-    name += "" if estimator is None else f"{SEPARATOR}{Path(estimator).resolve()}"
+    name = f"{ESTIMATES}{results}" + ("" if estimator is None else f"{SEPARATOR}{estimator}")
     poses = make_noise(name, NoiseLevel(*deviation))
     assert isinstance(poses, PoseResults)
     found = measure_recall(poses.folder, poses.description, poses.rows)
@@ -80,7 +79,7 @@ def score_poses(
                     "success": 100.0 * (rate.rate or 0.0),
                     "low": 100.0 * low,
                     "high": 100.0 * high,
-                    **_pool_recall([recall[scenario] for scenario in those if scenario in recall]),
+                    **pool_recall([recall[scenario] for scenario in those if scenario in recall]),
                 }
             )
     return rows
@@ -107,11 +106,11 @@ def list_grids(
     )
 
 
-def _pool_recall(several: Iterable[PoseRecall]) -> dict[str, float | None]:
+def pool_recall(several: Iterable[PoseRecall]) -> dict[str, float | None]:
     """Recall over the targets of several scenarios, in percent."""
     found = list(several)
     targets = sum(each.targets for each in found)
     return {
         name: 100.0 * sum(getattr(each, name) * each.targets for each in found) / targets if targets else None
-        for name in ("mssd", "mspd", "add")
+        for name in RECALLS
     }

@@ -20,7 +20,6 @@ from apo_bench.cli.shared.cores import count_cores
 from apo_bench.cli.shared.help import GROUPS, OPTIONS, Command, Group, Interruption, make_group
 from apo_bench.cli.shared.outputs import check_output, name_write_errors
 from apo_bench.cli.shared.printing import (
-    make_console,
     print_columns,
     print_json,
     print_table,
@@ -29,7 +28,6 @@ from apo_bench.cli.shared.printing import (
 )
 from apo_bench.cli.shared.setting_options import (
     add_options,
-    format_default,
     make_sweep_options,
     make_trial_options,
     read_axis,
@@ -57,8 +55,6 @@ __all__ = (
     "check_output",
     "complete_last_word",
     "count_cores",
-    "format_default",
-    "make_console",
     "make_group",
     "make_path_argument",
     "make_path_option",

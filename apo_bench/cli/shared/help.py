@@ -9,6 +9,8 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from apo_bench.records import NOISE_LEVEL, SETTINGS
+
 GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "One trial": ("run", "view", "inspect"),
@@ -19,19 +21,24 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """Heading -> commands of `apo-bench`, in this order."""
-OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+_OTHER_OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "Task and robot": ("--human-error-scale", "--clearance-mm", "--arm", "--grasp", "--robot-error"),
-        "Robot that probes": ("--ft-sensor", "--assumed-robot-error"),
-        "Observation": ("--noise-level", "--noise-mm", "--noise-deg", "--noise", "--pose-source", "--observation"),
-        "Correction": ("--method", "--contact-source", "--max-reobservations", "--min-predicted-success"),
-        "Trials": ("--trials", "--seed", "--independent-seeds", "--secret-seed-file"),
-        "Simulation": ("--fidelity", "--timestep-ms", "--trial-limit"),
+        "Task and robot": (),
+        "Robot that probes": (),
+        "Observation": ("--observation",),
+        "Correction": (),
+        "Trials": ("--trials", "--independent-seeds"),
+        "Simulation": ("--trial-limit",),
         "Processes": ("--workers", "--backend", "--address"),
         "Files": ("--out", "--save-observation", "--video"),
         "Display": ("--verbose", "--view", "--port", "--json"),
     }
 )
+"""Heading -> options that are no settings, in this order below those of the settings with this heading."""
+OPTIONS: Mapping[str, tuple[str, ...]] = {
+    heading: (*(f"--{info.option}" for info in (NOISE_LEVEL, *SETTINGS.values()) if info.heading == heading), *names)
+    for heading, names in _OTHER_OPTIONS.items()
+}
 """Heading -> options of `apo-bench run` and `sweep`, in this order."""
 OTHERS = "Other options"
 """Heading of the options without a heading of their own."""

@@ -46,8 +46,9 @@ class TightPair(NamedTuple):
     def describe(self, clearance_mm: float) -> str:
         """Return one sentence: depth as drawn, what recedes, and the play that results."""
         overlap = f"{self.depth_mm:.2g} mm inside" if self.depth_mm > 0.0 else "without play in"
+        recede = "recede" if len(self.faces) > 1 else "recedes"
         return (
-            f"'{self.part}' was drawn {overlap} '{self.other}': {', '.join(self.faces)} of '{self.part}' recede to "
+            f"'{self.part}' was drawn {overlap} '{self.other}': {', '.join(self.faces)} of '{self.part}' {recede} to "
             f"where they touch, and by {clearance_mm:g} mm of play a side, as stated under [parts.{self.part}.fit]"
         )
 

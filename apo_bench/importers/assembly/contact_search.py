@@ -31,7 +31,7 @@ _ROUNDS = 8  # Gauss-Newton iterations
 _ARM_M = 0.05
 """Lever arm that converts rotations to lengths."""
 NO_PLAY_MM = 1e-3  # a shaft and a hole have no play if theirs is at most this
-_COAXIAL_M = 1e-4  # largest offset of the axes of a shaft in its hole
+COAXIAL_M = 1e-4  # largest offset of the axes of a shaft in its hole
 _THREAD_M = 2.5e-3
 """A shaft up to this much larger in radius than its hole is a press fit or a thread; beyond it, another feature."""
 
@@ -125,14 +125,20 @@ def _find_tight_fit(
     return ""
 
 
-def find_coaxial_pairs(a: Solid, T_a: Array, b: Solid, T_b: Array) -> Iterator[tuple[RoundFace, RoundFace, float]]:
+def find_coaxial_pairs(
+    a: Solid, T_a: Array, b: Solid, T_b: Array, most_off_m: float = COAXIAL_M
+) -> Iterator[tuple[RoundFace, RoundFace, float]]:
     """Yield each shaft of one solid on the axis of a hole of the other, face of `a` first, and the radius of the hole
-    minus that of the shaft, [m]."""
+    minus that of the shaft, [m].
+
+    Args:
+        most_off_m: Largest distance of the axes.
+    """
     for wall, other in product(a.rounds.values(), b.rounds.values()):
         if classify_contact(wall, other) != "shaft in hole":
             continue
         fit = measure_mate(wall, T_a, other, T_b)
-        if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
+        if fit.gap_m < most_off_m and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
             yield wall, other, compute_geometric_play(wall, other)
 
 

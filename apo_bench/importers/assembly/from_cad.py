@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Hull, pose
 from apo_bench.importers.assembly.choices import DEFAULT_CHOICES, AssemblyChoices
 from apo_bench.importers.assembly.fasteners import find_fasteners, list_held_places
-from apo_bench.importers.assembly.misplaced import describe_misplaced
+from apo_bench.importers.assembly.misplaced import list_misplaced
 from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
 from apo_bench.importers.assembly.shaving import shave_overlaps
 from apo_bench.importers.cad.fallback import import_solid_anyway
@@ -121,9 +120,8 @@ def import_parts(
     require(len(copies) > 1, f"{files[0]}: fewer than two of its solids make parts: {'; '.join(lines.lines)}.")
     poses = write_places(copies, folder, ", ".join(file.name for file in files))
     posed = read_posed(poses, checked=False)  # each part was checked when it was written
-    for pair in combinations(posed, 2):
-        if misplaced := describe_misplaced(*pair):
-            lines.add(misplaced)
+    for misplaced in list_misplaced(posed):
+        lines.add(misplaced)
     if choices.fits == "auto":
         _shave_parts(posed, parts, choices, lines)
     return ImportedAssembly(poses, tuple(lines.lines), tuple(lines.notes))
@@ -163,7 +161,7 @@ _Found = list[tuple[str, RawSolid]]
 def _read_solids(files: Sequence[Path], unit: str | None, lines: _Report) -> Iterator[tuple[str, RawSolid]]:
     """Yield the solids of the files; those that cannot be read are reported."""
     for file in files:
-        source, solids = read_raw_solids(file, unit, lenient=True)
+        source, solids = read_raw_solids(file, unit, lenient=True, is_component=len(files) > 1)
         for warning in (*source.warnings, *(f"left out: {reason}" for reason in source.left_out)):
             lines.add(f"{file.name}: {warning}")
         yield from ((file.name, raw) for raw in solids)

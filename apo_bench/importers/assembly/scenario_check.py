@@ -197,7 +197,7 @@ def _check_room_for_grasps(scenario: Scenario, scene: Scene) -> Iterator[str]:
     # The open gripper must not collide with other parts when it takes each part, with the site at its nominal pose.
     layout = place_layout(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
     poses = layout.start
-    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
+    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
         operation = scenario.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
         depth, other = find_gripper_overlap(scene, move.transfer, poses, after)
@@ -222,7 +222,7 @@ def _check_reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     for i, j, yaw in sorted(places):
         x, y = np.add(site.center_m, np.multiply((i, j), site.spread_m))
         layout = place_layout(scenario, x, y, yaw, None, scene.clearance_mm)
-        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False, ()):
+        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
             code = solve_key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and (code, part) not in known:

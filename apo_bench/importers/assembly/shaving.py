@@ -1,18 +1,20 @@
 """Take off what no receding face explains where parts overlap a little: one of two convex pieces is cut along a plane.
 
 Faces recede as a whole (`added_clearance`). What overlaps beyond them, such as the lip of a snap fit or a rounded edge,
-is cut off at the plane across which the two pieces overlap least, and by the clearance behind it.
+is cut off at the plane across which the two pieces overlap least, and by the clearance behind it. If no straight way
+out is free, what is in the way on the freest one is cut off too.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from dataclasses import replace
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import manifold3d
 import numpy as np
 
-from apo_bench.geometry import Array, Hull, Piece, measure_intrusion, pose
+from apo_bench.geometry import Array, Hull, Piece, measure_intrusion, measure_world_bounds, pose
 from apo_bench.importers.assembly.added_clearance import add_clearance, limit_depth
 from apo_bench.importers.assembly.misplaced import find_least_overlap, measure_depth
 from apo_bench.importers.assembly.posed_parts import PosedPart
@@ -21,6 +23,9 @@ from apo_bench.scenario.layout_checks import DEEP_M
 
 _LARGEST_LOSS = 0.02
 """Largest share of the volume of a part that is taken off it against one other part."""
+_STEP_M = 1e-3  # between places along a way
+_WAY_FACTOR = 1.5
+"""Overlaps on the way may be deeper than those as drawn by this factor, since lips of snap fits are."""
 _NO_FLATS = np.zeros((0, 4))
 
 
@@ -55,20 +60,20 @@ def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: flo
     cut = set[Path]()
     lines = list[str]()
     for a, b in combinations(receded, 2):
-        depth_m = measure_intrusion(a.solid, a.T, b.solid, b.T)
-        if not DEEP_M < depth_m <= 1e-3 * limit_depth((a, b), most_mm):
-            continue
+        most_m = 1e-3 * limit_depth((a, b), most_mm)
+        places, depth_m = _list_tight_places(a, b, most_m)
         lost = {a.name: 0.0, b.name: 0.0}
         allowed = {each.name: 1e9 * _LARGEST_LOSS * each.solid.volume for each in (a, b)}
-        for p, q in _list_deep_pieces(a, b):
-            least = min(_cut_apart(a, p, b, q, pieces, clearance_mm), key=lambda each: each.lost_mm3)
+        for p, q, moved in _list_deep_pieces(a, places):
+            least = min(_cut_apart(a, p, moved, q, pieces, clearance_mm), key=lambda each: each.lost_mm3)
             if lost[least.of.name] + least.lost_mm3 > allowed[least.of.name]:
                 continue
             lost[least.of.name] += least.lost_mm3
             pieces[least.of.file][least.number] = least.piece
             cut.add(least.of.file)
+        where = "as drawn" if len(places) < 2 else "as drawn or on the way to their places"
         lines += [
-            f"'{a.name}' and '{b.name}' were drawn {1e3 * depth_m:.2g} mm inside each other where no whole face "
+            f"'{a.name}' and '{b.name}' are {1e3 * depth_m:.2g} mm inside each other {where}, where no whole face "
             f"explains it: {volume:.3g} mm^3 of '{name}' are taken off, which leaves {clearance_mm:g} mm of play"
             for name, volume in lost.items()
             if volume > 0.0
@@ -76,11 +81,49 @@ def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: flo
     return ShavedPieces({file: pieces[file] for file in cut}, tuple(lines))
 
 
-def _list_deep_pieces(a: PosedPart, b: PosedPart) -> Iterator[tuple[Piece, Piece]]:
-    """Yield the pairs of pieces of two parts that are inside each other."""
-    for p in a.solid.pieces:
+def _list_tight_places(a: PosedPart, b: PosedPart, most_m: float) -> tuple[list[PosedPart], float]:
+    """Return the second part at its place, and on the freest straight way from there if none is free.
+
+    Returns:
+        The places at which the two parts are to be cut apart, and the deepest overlap there, [m]; no places if the
+        overlap as drawn is deeper than `most_m`.
+    """
+    depth_m = measure_intrusion(a.solid, a.T, b.solid, b.T)
+    if depth_m > most_m:
+        return [], depth_m
+    here = [b] if depth_m > DEEP_M else []
+    best = _WAY_FACTOR * most_m
+    chosen = here
+    for way in np.concatenate([np.eye(3), -np.eye(3)]):
+        deepest = 0.0
+        tight = []
+        for moved in _move_along(a, b, way):
+            depth = measure_intrusion(a.solid, a.T, moved.solid, moved.T)
+            deepest = max(deepest, depth)
+            tight += [moved] if depth > DEEP_M else []
+            if deepest > best:
+                break
+        else:
+            if deepest <= DEEP_M:
+                return here, depth_m
+            best, chosen = deepest, [*here, *tight]
+    return chosen, max(depth_m, best if chosen is not here else 0.0)
+
+
+def _move_along(a: PosedPart, b: PosedPart, way: Array) -> Iterator[PosedPart]:
+    """Yield part b at places along a straight way, until its box is clear of that of part a."""
+    (low, high), (own_low, own_high) = (measure_world_bounds([(each.solid, each.T)]) for each in (a, b))
+    k = int(np.abs(way).argmax())
+    far_m = float(high[k] - own_low[k] if way[k] > 0.0 else own_high[k] - low[k])
+    for step in np.arange(_STEP_M, far_m, _STEP_M):
+        yield replace(b, T=pose.at(step * way) @ b.T)
+
+
+def _list_deep_pieces(a: PosedPart, places: Sequence[PosedPart]) -> Iterator[tuple[Piece, Piece, PosedPart]]:
+    """Yield the pairs of pieces of two parts that are inside each other, and the second part at that place."""
+    for p, b in product(a.solid.pieces, places):
         if measure_depth(a.T, (p,), b.T, b.solid.pieces) > DEEP_M:
-            yield from ((p, q) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
+            yield from ((p, q, b) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
 
 
 def _cut_apart(

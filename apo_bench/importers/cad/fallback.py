@@ -43,7 +43,7 @@ def import_solid_anyway(
             failed = error
             continue
         off = measure_deviation(raw, part.solid)
-        repair = f"{words}: they differ from it by up to {off:.2g} mm, and `scenario check` shows whether that matters"
+        repair = f"{words}, {off:.2g} mm off at most; `scenario check` shows whether that matters"
         return replace(part, raw=replace(part.raw, repairs=(*part.raw.repairs, repair)))
     if isinstance(failed, InputError):
         raise failed
@@ -52,8 +52,8 @@ def import_solid_anyway(
 
 def _list_cuts(raw: RawSolid, others: Array | None) -> Iterator[tuple[Callable[[], CutSolid], str]]:
     """Yield the ways to cut a solid that cannot be cut exactly, the finest first, with the words for a report."""
-    yield lambda: cut_solid(raw, others, coarse=True), "coarser pieces stand for the solid"
-    yield lambda: _cut_as_hull(raw), "its convex hull stands for the solid"
+    yield lambda: cut_solid(raw, others, coarse=True), "a coarser shape stands for the solid in collisions"
+    yield lambda: _cut_as_hull(raw), "its convex hull stands for the solid in collisions"
 
 
 def _cut_as_hull(raw: RawSolid) -> CutSolid:

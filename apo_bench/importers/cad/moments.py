@@ -7,18 +7,12 @@ import numpy as np
 import trimesh
 
 from apo_bench.geometry import Hull
-from apo_bench.importers.cad.pieces.convex_cutting import CutSolid
 from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, convert_to_mesh
 from apo_bench.scenario.parts.making.moments import Moments, compute_frustum_moments
 
 
-def compute_solid_moments(raw: RawSolid, cut: CutSolid) -> Moments:
-    """Return the moments of a solid, [m]: its mesh, plus the slivers between the facets and the fitted round walls.
-
-    If pieces are hulls of free-form shapes or fill holes, return the moments of the pieces.
-    """
-    if cut.hulls or cut.filled:
-        return compute_piece_moments(cut.pieces)
+def compute_solid_moments(raw: RawSolid) -> Moments:
+    """Return the moments of a solid, [m]: its mesh, plus the slivers between the facets and the fitted round walls."""
     moments = _compute_mesh_moments(raw.mesh)
     for region in raw.regions:
         if region.square:

@@ -1,6 +1,6 @@
 """Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
 
-import os
+import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +14,7 @@ from apo_bench.geometry import Array, Face, RoundFace, Solid, intersect_rays, me
 from apo_bench.importers.cad.contact_faces import make_contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
+from apo_bench.importers.cad.joined_solids import join_near_solids, number_solids
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.importers.cad.meshes.shells import split_into_solids
 from apo_bench.importers.cad.moments import compute_piece_moments, compute_solid_moments
@@ -41,6 +42,8 @@ _NEARLY_ALL = 0.98
 """The share of a flat face that must lie on pieces otherwise."""
 _SLIVERS = 0.01
 """Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
+_FACE_AT_FAULT = re.compile(r", faces, (\w+):")
+"""The face in the message of a part file that cannot be read."""
 # Why a filled hole can make no contact.
 _FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
@@ -63,7 +66,7 @@ class ImportedPart:
 
 
 def read_raw_solids(
-    path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES, lenient: bool = False
+    path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES, lenient: bool = False, is_component: bool = False
 ) -> tuple[CadFile, list[RawSolid]]:
     """Read the solids of a CAD file with named faces: stated in STEP files, fitted to triangles in meshes.
 
@@ -71,6 +74,8 @@ def read_raw_solids(
         unit: Unit of a mesh file; None: as stated or guessed.
         fewest_sides: Smallest number of facets of a round face around a full turn in a mesh.
         lenient: Whether the convex hull stands for a solid whose surface is open or crosses itself.
+        is_component: Whether solids of a mesh that lie next to each other are one part. In STEP files of several
+            components they always are.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
@@ -78,7 +83,8 @@ def read_raw_solids(
     if path.suffix.lower() in STEP_SUFFIXES:
         return read_step(path, unit, lenient)
     file, meshes = read_meshes(path, unit)
-    solids = merge_copies(raw for name, mesh in meshes for raw in _split_mesh(path, name, mesh, lenient))
+    join = join_near_solids if is_component else number_solids
+    solids = merge_copies(raw for name, mesh in meshes for raw in join(_split_mesh(path, name, mesh, lenient)))
     return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
 
 
@@ -133,20 +139,46 @@ def import_solid(
     stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
     title = clean_title(raw.name) if raw.name != name else ""
     stated |= {"density": density, "source": source, "title": title, "licence": "as that file"}
+    # Of boxes that stand for more detailed shapes, the faces are not those of their union.
+    stated["by_sites"] = others is None
     for moments in possible_moments:
-        path = write_part(name, replace(body, moments=moments), folder, **stated)
         try:
-            solid = load_part(path)
+            path, solid = _write_checked(name, replace(body, moments=moments), folder, stated, refused)
             break
         except InputError as error:
             fault = error
-            path.unlink()
-            path.with_suffix(".toml").unlink(missing_ok=True)
     else:  # no moments gave a part that could be read
-        why = str(fault).replace(f"{path.parent}{os.sep}", "").split("; ")[0].rstrip(".")
-        raise InputError(f"{source}: its convex pieces make no part ({why}); leave out fillets.") from fault
+        raise InputError(
+            f"{source}: no shape for collisions agrees with the solid; leave out fillets and small details."
+        ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
+
+
+def _write_checked(
+    name: str, body: Body, folder: Path, stated: Mapping[str, Any], refused: dict[str, str]
+) -> tuple[Path, Solid]:
+    """Write a part and read it back, without the faces that do not agree with its pieces.
+
+    Args:
+        stated: Further arguments of `write_part`.
+        refused: Gets the omitted faces with the reason.
+
+    Raises:
+        InputError: The part cannot be read back.
+    """
+    while True:
+        path = write_part(name, body, folder, **stated)
+        try:
+            return path, load_part(path)
+        except InputError as error:
+            path.unlink()
+            path.with_suffix(".toml").unlink(missing_ok=True)
+            face = _FACE_AT_FAULT.search(str(error))
+            if face is None or face[1] in refused:
+                raise
+            refused[face[1]] = str(error).split(": ", 1)[-1].split("; ")[0]
+            body = _remove_faces(body, {face[1]})
 
 
 def _choose_density(source: str, volume: float, density: float) -> tuple[float, tuple[str, ...]]:
@@ -191,20 +223,18 @@ def _list_possible_moments(source: str, raw: RawSolid, pieces: CutSolid) -> list
     """
     corners = sum(len(piece.corners) for piece in pieces.pieces)
     most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
-    require(
-        corners <= MOST_CORNERS_IN_ALL, f"{source}: the convex pieces of the part have {corners:,} corners; {most}."
-    )
-    moments = compute_solid_moments(raw, pieces)
+    require(corners <= MOST_CORNERS_IN_ALL, f"{source}: the shape for collisions has {corners:,} corners; {most}.")
     own = compute_piece_moments(pieces.pieces)
-    if pieces.coarse:
+    if pieces.coarse or pieces.hulls or pieces.filled:
         return [own]
     if all(region.kind == "plane" for region in raw.regions):
         filled = 1e9 * own.size
         require(
             abs(filled - raw.mesh.volume) <= _SLIVERS * raw.mesh.volume,
-            f"{source}: the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3; "
-            "its surface may cross itself, so repair it in its CAD program.",
+            f"{source}: the solid has {raw.mesh.volume:.6g} mm^3, its shape for collisions {filled:.6g} mm^3; its "
+            "surface may cross itself, so repair it in its CAD program.",
         )
+    moments = compute_solid_moments(raw)
     return [moments, own] if abs(own.size - moments.size) < _SLIVERS * own.size else [moments]
 
 

@@ -12,7 +12,9 @@ from typing import Literal, final
 
 from apo_bench.assembly import Plan
 from apo_bench.planning.insertion.attach_line import Attach
-from apo_bench.planning.prediction.plan_measures import ArmMove, MeasureCode, measure_plan
+from apo_bench.planning.prediction.arm_move import ArmMove
+from apo_bench.planning.prediction.measure import MeasureCode
+from apo_bench.planning.prediction.plan_measures import measure_plan
 from apo_bench.records import Thresholds
 
 ARM_CODES = ("unreachable_start", "unreachable", "gripper_room", "tip_error")

@@ -11,10 +11,10 @@
   the motions of an arm (`ArmMove`), which the simulation computes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal, NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,12 +33,14 @@ from apo_bench.assembly import (
 )
 from apo_bench.geometry import Array, Mate, remember
 from apo_bench.planning.insertion.attach_line import Attach
+from apo_bench.planning.prediction.arm_move import ArmMove
 from apo_bench.planning.prediction.interference import (
     Solids,
     make_physical_solids,
     measure_depths_from_above,
     measure_depths_on_line,
 )
+from apo_bench.planning.prediction.measure import DrawnMeasure, Measure
 from apo_bench.planning.prediction.rest_poses import (
     compute_residual,
     is_insertion,
@@ -49,94 +51,12 @@ from apo_bench.planning.prediction.rest_poses import (
 from apo_bench.planning.prediction.stability import BALANCED, measure_imbalance
 from apo_bench.records import Thresholds
 
-Refused = Literal["unreachable_start", "unreachable"]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ArmMove:
-    """The motion of an arm in one operation, or in undoing it, as plain numbers."""
-
-    operation: int
-    """Counted from 0."""
-    undo: bool = False
-    refused: Refused | None = None
-    """Why the plan is not started: no joint angles reach the pick pose, or the goal and its approach."""
-    at_limit: str = ""
-    """The joint at its limit in a refused pose; empty if the arm is too short, or nothing is refused."""
-    collides_with: str = ""
-    """The part that the open gripper penetrates the deepest at grasp or release."""
-    collision_mm: float = 0.0
-    """That depth."""
-    sag: Array = field(default_factory=lambda: np.eye(4))
-    """Displacement of the held part by its weight, (4, 4), world frame, [m]."""
-    beside_mm: float = 0.0
-    """Largest deviation of the moving tip from its line."""
-    margin_deg: float | None = None
-    """Least distance of a joint from its limits at the key poses; None if unknown."""
-
-
-MeasureKind = Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
-MeasureCode = Literal["residual", "interference", "unstable_goal", "gripper_room", "tip_error"]
 _AXIS_COSINE = 0.5
 """A face is a wall along the line of attach if the cosine of its normal with the line is smaller."""
 _LEAST_BESIDE_MM = 1e-3
 """A smaller penetration is a touch; it absorbs rounding."""
 _ROUNDING_MM = 1e-9
 """Lengths with a smaller difference are equal."""
-_CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
-_SENTENCES: Mapping[MeasureKind, tuple[MeasureCode, str]] = MappingProxyType(
-    {
-        "falls": ("unstable_goal", "the part would fall there"),
-        "fit": ("residual", _CONTACTS_OFF),
-        "side": ("residual", _CONTACTS_OFF),
-        "leans": (
-            "residual",
-            "the part would lean against what lies above it, as far as both clearances let it",
-        ),
-        "on_way": ("interference", "it would be {:.2f} mm deep in another part, {:g} mm are allowed"),
-        "from_above": ("interference", "its way in begins {:.2f} mm deep in another part"),
-        "gripper": (
-            "gripper_room",
-            "the open gripper would be {:.2f} mm deep in '{what}', {:g} mm are allowed",
-        ),
-        "own": ("tip_error", "the arm holds its way to {:.3f} mm only, and the play is {:g} mm"),
-        "tip": (
-            "tip_error",
-            "with the error of the arm's tip its contacts are {:.2f} mm off, {:g} mm are allowed",
-        ),
-    }
-)
-"""Kind of measure -> failure code, and its sentence with size and limit."""
-
-
-class Measure(NamedTuple):
-    """One error of a plan, and its limit."""
-
-    operation: int
-    """Counted from 0."""
-    kind: MeasureKind
-    size: float
-    """[mm]; negative for parts that are apart. `falls`, `leans`: the unbalanced share of the weight and of its moments
-    on a 10 mm arm."""
-    allowed: float
-    """Largest size without a failure."""
-    what: str = ""
-    """`gripper`: the part that the gripper would strike."""
-
-    @property
-    def exceeded(self) -> bool:
-        return self.size > self.allowed
-
-    @property
-    def code(self) -> MeasureCode:
-        """The failure code if the size exceeds the limit."""
-        return _SENTENCES[self.kind][0]
-
-    @property
-    def why(self) -> str:
-        """The sentence of the failure, such as `it would be 7.59 mm deep in another part, 1 mm are allowed`."""
-        return _SENTENCES[self.kind][1].format(self.size, self.allowed, what=self.what)
 
 
 class _PlannedOperation(NamedTuple):
@@ -156,22 +76,6 @@ class _PlannedOperation(NamedTuple):
     @property
     def operation(self) -> Operation:
         return self.alone.operations[0]
-
-
-class DrawnMeasure(NamedTuple):
-    """One error of a plan for r draws of the robot's errors, with the limits."""
-
-    operation: int
-    kind: MeasureKind
-    size: Array
-    """(r,), as in `Measure`."""
-    allowed: Array
-    """(r,)."""
-    what: str = ""
-
-    def first_draw(self) -> Measure:
-        """The `Measure` of the first draw, which is the only one."""
-        return Measure(self.operation, self.kind, float(self.size[0]), float(self.allowed[0]), self.what)
 
 
 def measure_plan(

@@ -11,6 +11,8 @@ from apo_bench.scenario.parts.part_file import PartFile
 
 _TOUCHING_M = 2e-5
 """Pieces with a smaller gap touch."""
+_APART_M = 1e-3
+"""Pieces with a larger gap make separate solids; the balls of a bearing have a smaller one."""
 _SHARE = 1e-3
 """Largest relative error of the stated volume."""
 
@@ -40,17 +42,23 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
         raise InputError(f"{file}, inertia_mm5: that of the pieces about their centroid is [{six}]; state that.")
 
 
-def group_touching_pieces(pieces: Sequence[Piece]) -> list[set[int]]:
-    """Group the indices of pieces that are connected by touching, directly or through other pieces."""
+def group_touching_pieces(pieces: Sequence[Piece], gap_m: float = _TOUCHING_M) -> list[set[int]]:
+    """Group the indices of pieces with smaller gaps between them, directly or through other pieces."""
     from scipy.cluster.hierarchy import DisjointSet
+    from scipy.spatial import cKDTree
 
     solids = DisjointSet(range(len(pieces)))
-    low = np.array([piece.center - piece.half for piece in pieces]) - _TOUCHING_M
-    high = np.array([piece.center + piece.half for piece in pieces]) + _TOUCHING_M
+    # Most neighbours share corners, which is quick to see.
+    owner = np.repeat(np.arange(len(pieces)), [len(piece.corners) for piece in pieces])
+    shared = cKDTree(np.concatenate([piece.corners for piece in pieces])).query_pairs(gap_m, output_type="ndarray")
+    for i, k in np.unique(owner[shared], axis=0).tolist():
+        solids.merge(i, k)
+    low = np.array([piece.center - piece.half for piece in pieces]) - gap_m
+    high = np.array([piece.center + piece.half for piece in pieces]) + gap_m
     # Only pairs whose bounding boxes meet are tested.
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
-            if not solids.connected(i, int(k)) and _measure_gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
+            if not solids.connected(i, int(k)) and _measure_gap(pieces[i], pieces[int(k)]) < gap_m:
                 solids.merge(i, int(k))
     return list(solids.subsets())
 
@@ -66,7 +74,7 @@ def _measure_gap(a: Piece, b: Piece) -> float:
 def check_part(file: PartFile, solid: Solid) -> None:
     """Raise an `InputError` unless the stated properties of a part agree with its pieces."""
     if file.stated is not None:
-        count = len(group_touching_pieces(solid.pieces))
+        count = len(group_touching_pieces(solid.pieces, _APART_M))
         require(count == 1, f"{file.path}: the pieces make {count} separate solids; a part is one rigid piece.")
         stated = file.path.with_suffix(".toml")
         check_matter(solid, str(stated), check_faces(solid, stated))

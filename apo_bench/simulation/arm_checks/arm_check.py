@@ -198,7 +198,7 @@ def _force(arm: Arm, scene: Scene) -> float:
 def _margins(scene: Scene, plan: Plan) -> Array:
     """The least distance of each joint from its limits along a plan, (joints,), [deg]; not a number if out of reach."""
     least = np.full(len(scene.arm.joints), np.inf)
-    for move in plan_moves(plan, scene, False, ()):
+    for move in plan_moves(plan, scene, False):
         angles = solve_key_angles(move.transfer, scene)
         if angles.code:
             return np.full(len(least), np.nan)

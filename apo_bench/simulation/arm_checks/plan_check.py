@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
-from apo_bench.planning.prediction.plan_measures import ArmMove, Refused
+from apo_bench.planning.prediction.arm_move import ArmMove, Refused
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
@@ -37,7 +37,7 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     """
     predicted = list[ArmMove]()
     estimated = plan.start
-    for move in plan_moves(plan, scene, spiral, ()):
+    for move in plan_moves(plan, scene, spiral):
         operation = plan.assembly.operations[move.step.operation]
         after = compute_transferred_poses(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.arm import Arm, ArmLimits
+from apo_bench.simulation.arms.arm import Arm, ArmLimits, Hand
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.gripper_file import read_gripper
@@ -20,6 +20,7 @@ from apo_bench.simulation.arms.hands import check_names, find_pad, scale_drive
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import compile_model, load_model
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, is_soft, joint_inertia
+from apo_bench.simulation.arms.sliding_gripper import COUPLED_SOLIMP, COUPLED_SOLREF, drive_sliding_gripper
 from apo_bench.simulation.arms.stated import model_files, speed_limits, stated_arm
 
 _TIP = "tip"
@@ -27,8 +28,6 @@ _GRIPPER = "gripper/"
 _FINGER_ARMATURE = 1e-4  # [kg m^2]
 _FINGER_DAMPING = 0.02  # [Nm s/rad]
 """Added to finger joints that have neither, since their light links would vibrate without end."""
-_COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
-_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
 _DEFAULT_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they yield 1 mm to a few newtons
 _USUAL_FINGERS_MM_S = 50.0
 """Default speed of each finger, as the hand of a Panda.
@@ -82,7 +81,7 @@ def build_arm(description: ArmDescription) -> Arm:
     flange, T_flange = find_flange(model, description)
     joints = find_joints(model, flange, description)
     last = model.body(flange).name
-    if description.hand_file is None:
+    if description.gripper.slides:
         return stated_arm(description, model, joints, last)
     mount_gripper(spec, last, T_flange, description)
     make_passive(spec, joints)
@@ -94,13 +93,8 @@ def build_arm(description: ArmDescription) -> Arm:
         len(home) == len(joints),
         f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.",
     )
-    gripper = read_gripper(description.hand_file)
-    prefix = "" if description.gripper_file is None else _GRIPPER
-    left, right = (find_pad(whole, prefix + name, description.hand_file) for name in gripper.pads)
-    hand = gripper.hand(prefix, (left, right))
-    mount = last if gripper.mount is None else prefix + gripper.mount
-    check_names(whole, hand, mount, description.hand_file)
-    scale_drive(spec, hand.actuators, gripper.drive_scale)
+    gripper = _fit_gripper(spec, whole, last, description)
+    hand = gripper.hand
     base = pose.pack(description.base_frame)
     arm = Arm(
         mjcf=description.file,
@@ -110,11 +104,11 @@ def build_arm(description: ArmDescription) -> Arm:
         tip=_TIP,
         fingers=hand.joints,
         grip="",
-        mount=mount,
+        mount=gripper.mount,
         home=home,
         opening_m=float(hand.opening[-1]),
         squeeze_m=hand.squeeze_m,
-        model=_with_tip(spec, mount, gripper.tip_frame(description.hand_file)),
+        model=_with_tip(spec, gripper.mount, gripper.T_tip),
         hand=hand,
         limits=ArmLimits(
             payload_kg=description.payload_kg,
@@ -129,9 +123,42 @@ def build_arm(description: ArmDescription) -> Arm:
     own = _drive(spec, joints, joint_inertia(whole, joints, arm.home), drives, hand.actuators, description)
     spec.compile()
     control = "own position actuators" if own else "position servos made from the model"
-    scale = gripper.drive_scale
+    scale = gripper.scale
     stronger = f", gripper drive {scale:.3g} times as strong as in the model" if scale != 1.0 else ""
     return replace(arm, model=str(spec.to_xml()), control=control + stronger)
+
+
+class _Gripper(NamedTuple):
+    """The gripper of an arm."""
+
+    hand: Hand
+    mount: str
+    """The body that carries it."""
+    T_tip: Array
+    """(4, 4), the tip in the mount."""
+    scale: float = 1.0
+    """Strength of its drive, as a multiple of that in the model."""
+
+
+def _fit_gripper(spec: Any, model: Any, last: str, description: ArmDescription) -> _Gripper:
+    """Return the gripper that a gripper file describes, else the sliding fingers of the model, with its drive changed.
+
+    Args:
+        model: The compiled model of `spec`.
+        last: The last body of the arm.
+    """
+    file = description.hand_file
+    if file is None:
+        hand, T_tip = drive_sliding_gripper(spec, model, last, description)
+        return _Gripper(hand, last, T_tip)
+    table = read_gripper(file)
+    prefix = "" if description.gripper_file is None else _GRIPPER
+    left, right = (find_pad(model, prefix + name, file) for name in table.pads)
+    hand = table.hand(prefix, (left, right))
+    mount = last if table.mount is None else prefix + table.mount
+    check_names(model, hand, mount, file)
+    scale_drive(spec, hand.actuators, table.drive_scale)
+    return _Gripper(hand, mount, table.tip_frame(file), table.drive_scale)
 
 
 def _with_tip(spec: Any, mount: str, T: Array) -> str:
@@ -175,8 +202,8 @@ def make_passive(spec: Any, joints: Sequence[str]) -> None:
     """
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _DEFAULT_SOLREF:
-            equality.solref[:] = _COUPLED_SOLREF
-            equality.solimp[:] = _COUPLED_SOLIMP
+            equality.solref[:] = COUPLED_SOLREF
+            equality.solimp[:] = COUPLED_SOLIMP
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
     for geom in spec.geoms:

@@ -21,9 +21,10 @@ Torque = Annotated[float, Meta(gt=0.0, le=1e5)]
 
 
 class GripperDescription(FileTable, frozen=True, kw_only=True):
-    """The table `[gripper]`: a gripper file as `hand`, or a gripper of `slides`.
+    """The table `[gripper]`: a gripper file as `hand`, a gripper of `slides`, or neither.
 
     A gripper of slides has one sliding finger on each side, both driven by one actuator; its model is used as it is.
+    Without either, two sliding fingers are looked for in the model of the arm.
     """
 
     hand: Text | None = None
@@ -45,7 +46,7 @@ class GripperDescription(FileTable, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         stated = [each is not None for each in (self.slides, self.tip, self.opening_mm, self.actuators)]
-        if not any(stated) and self.hand is None:
+        if self.mjcf and not any(stated) and self.hand is None:
             raise ValueError("what the gripper does is not stated; name its gripper file as 'hand', or state 'slides'.")
         if any(stated) and not all(stated):
             raise ValueError("'tip', 'slides', 'opening_mm' and 'actuators' are given together; state all of them.")
@@ -58,7 +59,7 @@ class ArmTable(FileTable, frozen=True, kw_only=True):
 
     schema: Literal["apo-bench/arm/1"]
     mjcf: Text
-    gripper: GripperDescription
+    gripper: GripperDescription = GripperDescription()
     flange: Text | None = None
     """A site or a body; None: the last body of the one chain of hinges."""
     joints: Names | None = None
@@ -92,7 +93,7 @@ class ArmDescription(ArmTable, frozen=True, kw_only=True):
 
     @property
     def hand_file(self) -> Path | None:
-        """The gripper file; None if slides are stated."""
+        """The gripper file; None if slides are stated, or found in the model."""
         return None if self.gripper.hand is None else gripper_path(self.gripper.hand, self.file.parent)
 
     @property

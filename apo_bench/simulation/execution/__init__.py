@@ -8,7 +8,6 @@ from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEA
 from apo_bench.simulation.execution.grasp_clearance import RestingPart, Stroke, find_clear_grasp, list_obstacles
 from apo_bench.simulation.execution.grasp_frame import make_tip_frame
 from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, plan_moves, solve_key_angles
-from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState, restore_state, save_state
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
@@ -25,14 +24,12 @@ __all__ = (
     "DEFAULT_EXECUTION",
     "OPEN_TO_PICK_M",
     "OPEN_TO_RELEASE_M",
-    "PROBING_ACTIONS",
     "SAFE_M",
     "STAND_OFF_M",
     "Execution",
     "ExecutionConfig",
     "Grip",
     "Move",
-    "ProbingConfig",
     "ReplayCache",
     "RestingPart",
     "SavedState",

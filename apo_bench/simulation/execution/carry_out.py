@@ -185,13 +185,12 @@ def choose_pace(t: Transfer, second: Grip | None) -> Pace:
     Args:
         second: The next grip, if the grip changes during the insertion.
     """
-    bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
     if not t.into.level:
         return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
     entrances = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.entrances)
     if second is not None and t.into.left is not None:
         return Pace(_THROUGH, entrances, t.into.left)
-    if not bottom:
+    if not t.presses:
         return Pace(_THROUGH, entrances, 0.0)
     return Pace(_THROUGH, (*entrances, (_BOTTOM_M, -math.inf, _TOUCH)), -_OVERTRAVEL_M)
 
@@ -307,7 +306,7 @@ def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array
     """
     guard = Guard(t.into.direction, t.insert_n)
     goal = after_search(T_search, translate(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
-    if not any(macro.name == "move-to-bottom" for macro in t.macros):
+    if not t.presses:
         return press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)[0]
     # Up to just before the bottom, then slowly until contact.
     line = _into(robot, t, translate(goal, t.into.direction, -_BOTTOM_M), _BOTTOM_M)

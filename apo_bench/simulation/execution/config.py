@@ -40,14 +40,9 @@ class ExecutionConfig:
         check("fidelity", self.fidelity)
 
     @property
-    def actions(self) -> tuple[str, ...]:
-        """The probing actions of the robot, none without probing."""
-        return () if self.probing is None else self.probing.actions
-
-    @property
     def searches(self) -> bool:
-        """Whether the robot searches for holes, by the spiral or as a probing action."""
-        return self.spiral or "search" in self.actions
+        """Whether the robot searches for holes: a robot that probes always does."""
+        return self.spiral or self.probing is not None
 
 
 DEFAULT_EXECUTION = ExecutionConfig()

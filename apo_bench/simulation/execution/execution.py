@@ -27,9 +27,10 @@ def moves_with_error(plan: Plan, scene: Scene, config: ExecutionConfig, error: R
     Args:
         error: Hand-eye and tool error enter here; joint errors are part of the simulated robot. None: no error.
     """
+    probes = config.probing is not None
     if error is None:
-        return plan_moves(plan, scene, config.searches, config.actions)
-    planned = plan_moves(error.plan(plan), scene, config.searches, config.actions)
+        return plan_moves(plan, scene, config.searches, probes)
+    planned = plan_moves(error.plan(plan), scene, config.searches, probes)
     return tuple(Move(step, transfer.with_tip_at(error.pads)) for step, transfer in planned)
 
 
@@ -124,7 +125,7 @@ class Execution:
         Raises:
             ExecutionAborted: Something went wrong.
         """
-        grip = pick(self.robot, transfer, again="square" in self.config.actions)
+        grip = pick(self.robot, transfer, again=self.probing is not None)
         self.robot.slip(operation)
         return grip
 

@@ -46,6 +46,8 @@ _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the
 _FIRM_N = 80.0
 """Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
 an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
+_ROOM_MM = 0.2
+"""Least clearance with which it does so: at that speed the tip is up to 0.3 mm off its line."""
 _SEAT_N = 2.0  # least force limit of a motion that ends on the seat of a part that is clamped to a fixed one
 _CARRIES = 0.1
 """A face carries weight if the vertical component of its normal is at least this."""
@@ -61,14 +63,14 @@ class Move(NamedTuple):
 
 
 @remember
-def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...]) -> tuple[Move, ...]:
+def plan_moves(plan: Plan, scene: Scene, spiral: bool, probes: bool = False) -> tuple[Move, ...]:
     """Return the move of each step of the schedule.
 
     Cached, since both the plan check and the execution need the moves.
 
     Args:
         spiral: Whether the robot searches for a hole when a motion into it is stopped.
-        actions: Of `PROBING_ACTIONS`; `square`, `lay` and `search` change the transfers.
+        probes: Whether the robot probes, which squares parts, lays them flat and searches in the last motion.
     """
     estimated: Poses = plan.start
     put_by: dict[str, int | None] = {}
@@ -95,8 +97,8 @@ def plan_moves(plan: Plan, scene: Scene, spiral: bool, actions: tuple[str, ...])
             put_by[operation.main] = k
         after = compute_transferred_poses(operation, target, estimated)
         transfer = _transfer(plan.assembly, scene, step, was, target, estimated, after, spiral)
-        if actions and not (step.undo or transfer.carried):
-            transfer = _with_actions(plan.assembly, scene, k, transfer, estimated, actions)
+        if probes and not (step.undo or transfer.carried):
+            transfer = _with_probing(plan.assembly, scene, k, transfer, estimated)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
         estimated = after
     return tuple(prepared)
@@ -117,7 +119,7 @@ def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False, ()))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
 
 
 def _transfer(
@@ -163,8 +165,9 @@ def _transfer(
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     ways = list_entrance_distances(assembly, comes, after, into.direction)
-    # A hand that does not hold firmly is slow from the first entrance on.
-    first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
+    # A hand that does not hold firmly, or has little room, is slow from the first entrance on.
+    quick = holds_firmly(scene.arm) and scene.clearance_mm >= _ROOM_MM
+    first = 0.0 if quick else max(ways, default=0.0)
     clamps = list_clamps(scene.scenario)
     clamps_to = clamps.get(part, "") if operation.clamped and not undo else ""
     loose = [p for p in list_neighbours(contacts, operation.moves) if p in weight and p not in clamps]
@@ -203,25 +206,22 @@ def holds_firmly(arm: Arm) -> bool:
     return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
 
 
-def _with_actions(
-    assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses, actions: tuple[str, ...]
-) -> Transfer:
-    """Return the transfer with probing actions.
+def _with_probing(assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses) -> Transfer:
+    """Return the transfer of a robot that probes.
 
     A part that is enclosed at its start, or touches another at its side, is neither squared nor laid down there.
     """
     free = not (t.out.level or t.away or t.drawn)
-    squared = "square" in actions and free
-    laid = "lay" in actions and (t.into.level or (bool(t.entrances) and free))
+    laid = t.into.level or (bool(t.entrances) and free)
     flat = find_flat_placement(assembly, scene, t, estimated) if laid else None
     side_touches = (
         () if flat is None or t.into.level else find_side_touches(assembly, scene, t, flat.T[:3, :3], estimated)
     )
     return replace(
         t,
-        in_last="search" in actions,
+        in_last=True,
         slow=t.slow if t.into.level else max(t.slow, max(t.entrances, default=0.0) + WALL_MARGIN_M),
-        squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if squared else (),
+        squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if free else (),
         flat=flat,
         side_touches=side_touches,
     )

@@ -142,6 +142,11 @@ class Transfer:
         return min(self.into.travel, self.slow + _AHEAD_M) if self.into.direction[2] < -_STRAIGHT else self.into.travel
 
     @property
+    def presses(self) -> bool:
+        """Whether a level motion goes on to a contact at its end: that of a bottom, or the seat of a clamped part."""
+        return bool(self.clamps_to) or any(macro.name == "move-to-bottom" for macro in self.macros)
+
+    @property
     def foremost(self) -> Array:
         """`front`, or the origin of the part where no hole is searched for, (3,), [m]."""
         return np.zeros(3) if self.front is None else self.front

@@ -23,7 +23,7 @@ NEAR_HELD_M = (0.00005, 0.00015)
 during a motion is smaller."""
 _PLACES = 100  # places checked along a line, if their spacing is within `_APART_M`
 _APART_M = (0.0002, 0.001)  # least and greatest spacing of the checked places
-_RUN_UP_S = 0.04
+RUN_UP_S = 0.04
 """Time simulated before a motion comes near: an arm that starts in motion needs this to catch up."""
 _SHORTEST_S = 0.05
 """Least time between two stretches that is skipped."""
@@ -84,7 +84,7 @@ def find_near_spans(
     line: Trajectory,
     s: Array,
     world: World | None = None,
-    run_up_s: float = _RUN_UP_S,
+    run_up_s: float = RUN_UP_S,
     near_m: tuple[float, float] = NEAR_HELD_M,
 ) -> list[_Span]:
     """Return the stretches of a line on which something comes near, each with its run-up, as indices into `s`.

@@ -24,7 +24,7 @@ from apo_bench.simulation.hooks import TICK_S, Hooks, Phase, as_hooks
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, fast_forward, hold_steady, take_along, weld
-from apo_bench.simulation.robot.obstacles import clear, find_near_spans, moving_with_tip
+from apo_bench.simulation.robot.obstacles import RUN_UP_S, clear, find_near_spans, moving_with_tip
 from apo_bench.simulation.robot.paths import Trajectory, distance, smooth_trajectory
 from apo_bench.simulation.robot.reach import along, feedforward_command, limit_speed, plan_waypoints, solve_end_angles
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -47,6 +47,8 @@ _LAG_M = 1e-4
 hand is within 0.02 mm."""
 _PUSHED_N = 0.5  # external force above which contact may hold the arm off its command
 _LEVEL_S = 0.2  # duration of this correction
+_SWING_S = 0.25
+"""Time simulated before held parts may touch something on a guarded motion: until then they swing in the hand."""
 _SAG_STEPS = 25  # physics steps between two poses for which the sag of the joints is computed
 
 
@@ -170,7 +172,8 @@ class Robot:
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         done = 0
-        for begin, end in self._spans(line, s):
+        swings = guard is not None and bool(self.forces.held)
+        for begin, end in self._spans(line, s, _SWING_S if swings else RUN_UP_S):
             q = self.q
             if begin > done:  # nothing is near before this stretch: skip to its begin
                 q = self.reached(solve_end_angles(kinematics, line, s[done], s[begin], q))
@@ -356,7 +359,7 @@ class Robot:
         friction = self.scene.grasp == "friction"
         self._carried = Carried(self.forces.held) if on and friction and self.forces.held else None
 
-    def _spans(self, line: Trajectory, s: Array) -> list[tuple[int, int]]:
+    def _spans(self, line: Trajectory, s: Array, run_up_s: float) -> list[tuple[int, int]]:
         """Return the stretches of a line that are simulated, as first and last indices into `s`.
 
         With full fidelity this is the whole line; else the stretches where something is near, and always its end.
@@ -366,7 +369,7 @@ class Robot:
             return [(0, n)]
         held = self.forces.held
         moving = moving_with_tip(self.scene, self.data, self.tip(), self.opening(), held)
-        spans = find_near_spans(self.scene, self.data, moving, held, line, s)
+        spans = find_near_spans(self.scene, self.data, moving, held, line, s, run_up_s=run_up_s)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _pass(self, seconds: float) -> None:

@@ -127,12 +127,16 @@ def _add_part(
         bits: Contact bits by the name of a piece.
     """
     solid = scenario.assembly.solids[part]
+    # Pieces thinner than the depth by which fit faces recede are no longer part of the solid.
+    names = [piece.name for piece in file.pieces]
+    left = [piece.name for piece in solid.pieces]
     require(
-        [piece.name for piece in file.pieces] == [piece.name for piece in solid.pieces],
+        [name for name in names if name in left] == left,
         f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.",
     )
     own = _bare_part(file.model)
-    dress(own, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density, bits)
+    pieces = {**dict.fromkeys(names, ()), **simulated_pieces(solid, clearance_mm * 1e-3)}
+    dress(own, solid, pieces, file.density, bits)
     set_contact(own.geoms, settings)
     if part in scenario.colors:
         for geom in own.geoms:

@@ -77,14 +77,9 @@ class Marks:
     """Arrows and rings to draw into a picture; pass it as `more` to a function that draws one."""
 
     marks: Sequence[ShiftArrows | TurnRing]
-    opacity: float = 1.0
-    """The opacity of the parts."""
 
     def __call__(self, scene: Any) -> None:
         """Draw into MuJoCo's abstract scene (`mjvScene`)."""
-        for geom in scene.geoms[: scene.ngeom]:
-            if geom.category == mujoco.mjtCatBit.mjCAT_DYNAMIC:
-                geom.rgba[3] *= self.opacity
         for mark in self.marks:
             if isinstance(mark, ShiftArrows):
                 _shift(scene, mark)

@@ -199,8 +199,11 @@ def check_film(path: Path) -> None:
         raise missing_package("an MP4 film", "imageio-ffmpeg", ", or give a name that ends in .gif.")
 
 
-def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
+def save_film(frames: Iterable[_Image], path: str | Path, fps: float, **encoding: Any) -> None:
     """Write images as a film, MP4 or GIF by the ending.
+
+    Args:
+        encoding: For an MP4: arguments of `imageio_ffmpeg.write_frames`.
 
     Raises:
         InputError: As of `check_film`, or a path that cannot be written.
@@ -212,7 +215,7 @@ def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
     ending = path.suffix.lower()
     how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
     if ending == ".mp4":
-        how = {"fps": fps, "macro_block_size": 8}
+        how = {"fps": fps, "macro_block_size": 8, **encoding}
     try:
         film = imageio.imwrite("<bytes>", np.array(list(frames)), extension=ending, **how)
     except OSError as error:

@@ -1,9 +1,10 @@
 """Photographs of parts: colours by rendering; depth and masks by ray casts, which need no graphics."""
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
 import mujoco
@@ -11,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
-from apo_bench.geometry import Array, Ints, collect_corners, pose
+from apo_bench.geometry import Array
 from apo_bench.perception.depth_camera.range_finder import PinholeView
 from apo_bench.simulation.scene import KeptRenderer, Scene, aim_camera, build_data
 from apo_bench.simulation.sensor.rays import ModelRays
 
-_MARGIN_PX = 2
-"""Pixels around the projected corners of a part in which its silhouette is looked for."""
 _SHADOW_TEXELS = 2048  # along a side of the shadow map; each covers 0.8 mm on the table, a pixel at 0.9 m 1.1 mm
 _LIGHT_SPREAD = np.array([0.5, 0.5, 0.0])
 """Varied lights: largest change of their direction, relative to its vertical component."""
@@ -25,8 +24,6 @@ _BRIGHTNESS = 0.6, 1.3
 """Varied lights: range of their brightness, relative to the usual one."""
 _FIXED_COLOR = 0.1, 0.95
 """Varied colours: range of red, green and blue of the fixed parts."""
-_NEAREST_M = 1e-3
-"""Depth at which a part in front of the image plane begins."""
 
 Mask = NDArray[np.bool_]
 Box = tuple[int, int, int, int]
@@ -42,6 +39,21 @@ class Silhouette(NamedTuple):
     """How many there are, also outside the image."""
     box: Box
     """The box around them, which may reach beyond the image."""
+
+
+class PrintedMark(NamedTuple):
+    """A coloured rectangle on a part."""
+
+    T: Array
+    """(4, 4), frame of the part, [m]; its third axis points out of the surface."""
+    half: Array
+    """Half of its length, width and height, (3,), [m]."""
+    color: tuple[float, ...]
+    """Red, green and blue, from 0 to 1."""
+
+
+Marks = Mapping[str, Sequence[PrintedMark]]
+"""Part -> its marks."""
 
 
 class Photograph(NamedTuple):
@@ -89,8 +101,8 @@ class Photographer:
         is_fixed = self._world.geom_part >= len(self._world.free)
         model.geom_rgba[is_fixed, :3] = rng.uniform(*_FIXED_COLOR, 3)
 
-    def take(self, view: PinholeView, poses: Poses) -> Photograph:
-        """Take a photograph of parts at these poses, (4, 4), world, [m]; others are at their start."""
+    def take(self, view: PinholeView, poses: Poses, marks: Marks = MappingProxyType({})) -> Photograph:
+        """Take a photograph of parts with marks at these poses, (4, 4), world, [m]; others are at their start."""
         every = {**self._scene.scenario.start, **poses}
         shape = view.height, view.width
         distance, index = self._cast(every, view.origin, view.rays)
@@ -98,7 +110,7 @@ class Photographer:
         movable = self._scene.shown.free
         visible = {part: (index == names.index(part)).reshape(shape) for part in movable}
         return Photograph(
-            self._render(view, every),
+            self._render(view, every, marks),
             (distance * (view.rays @ view.T_world_view[:3, 2])).reshape(shape),
             visible,
             {part: self._silhouette(view, part, every[part]) for part in movable},
@@ -110,7 +122,7 @@ class Photographer:
             self._renderer.close()
             self._renderer = None
 
-    def _render(self, view: PinholeView, poses: Poses) -> NDArray[np.uint8] | None:
+    def _render(self, view: PinholeView, poses: Poses, marks: Marks) -> NDArray[np.uint8] | None:
         """Render the colours with a free camera, whose image is upright as that of `look_at`."""
         if self._renderer is None:
             return None
@@ -118,39 +130,30 @@ class Photographer:
         azimuth = np.degrees(np.arctan2(forward[1], forward[0]))
         elevation = np.degrees(np.arcsin(forward[2]))
         camera: Any = aim_camera(view.origin + forward, 1.0, float(azimuth), float(elevation))
-        return self._renderer.draw(build_data(self._world, self._scene, poses), camera, partial(_roll, view=view))
+        placed = [(poses[part] @ each.T, each) for part, several in marks.items() for each in several]
+        adjust = partial(_adjust_scene, upward=-view.T_world_view[:3, 1], marks=placed)
+        return self._renderer.draw(build_data(self._world, self._scene, poses), camera, adjust)
 
     def _silhouette(self, view: PinholeView, part: str, T: Array) -> "Silhouette":
         """The pixels that show a part alone."""
-        corners = pose.apply(T, collect_corners(self._scene.pieces[part])[0])
-        (left, top), (right, bottom) = _frame_points(view, corners)
-        v, u = np.mgrid[top:bottom, left:right]
-        _, index = self._cast({part: T}, view.origin, view.cast_through(u, v))
-        rows, columns = (each.ravel()[index == 0] for each in (v, u))
-        mask = np.zeros((view.height, view.width), dtype=np.bool_)
-        inside = (rows >= 0) & (rows < view.height) & (columns >= 0) & (columns < view.width)
-        mask[rows[inside], columns[inside]] = True
-        return Silhouette(mask, len(rows), find_box(rows, columns))
+        pixels = self._cast.find_pixels(part, T, view)
+        mask = np.isfinite(pixels.fill_image(view.height, view.width))
+        return Silhouette(mask, len(pixels.rows), find_box(pixels.rows, pixels.columns))
 
 
-def _roll(scene: mujoco.MjvScene, view: PinholeView) -> None:
-    """Give both eyes of MuJoCo's camera the exact upward direction of a view, which may be rolled."""
-    for camera in scene.camera:
-        camera.up = -view.T_world_view[:3, 1]
+def _adjust_scene(scene: mujoco.MjvScene, upward: Array, marks: Sequence[tuple[Array, PrintedMark]]) -> None:
+    """Give MuJoCo's abstract scene the exact upward direction of a view, which may be rolled, and marks.
 
-
-def _frame_points(view: PinholeView, points: Array) -> Ints:
-    """The left upper and right lower pixel around points (k, 3), world, (2, 2), each column and row.
-
-    It ends one image beyond the image, or there if a point is behind the camera.
+    Args:
+        marks: Poses, (4, 4), world, and marks; those for which the scene has no room are left out.
     """
-    size = np.array([view.width, view.height])
-    local = pose.apply(pose.inverse(view.T_world_view), points)
-    if local[:, 2].min() < _NEAREST_M:
-        return np.array([-size, 2 * size])
-    pixels = local[:, :2] / local[:, 2:] * view.focal + size / 2
-    ends = np.floor(pixels.min(axis=0)) - _MARGIN_PX, np.ceil(pixels.max(axis=0)) + _MARGIN_PX
-    return np.clip(np.array(ends).astype(np.int64), -size, 2 * size)
+    for camera in scene.camera:  # both eyes
+        camera.up = upward
+    for T, mark in marks[: scene.maxgeom - scene.ngeom]:
+        rgba = np.array([*mark.color, 1.0], dtype=np.float32)
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, mark.half, T[:3, 3], T[:3, :3].ravel(), rgba)
+        scene.ngeom += 1
 
 
 def find_box(rows: NDArray[Any], columns: NDArray[Any]) -> Box:

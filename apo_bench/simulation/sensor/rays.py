@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Solid, shrink_pieces
+from apo_bench.geometry import Array, Ints, Solid, collect_corners, pose, shrink_pieces
 from apo_bench.perception.depth_camera.range_finder import VIEWS, PinholeView, RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
@@ -17,6 +17,10 @@ _AWAY_M = -5.0
 _FARTHEST_M = 100.0  # greatest length of a ray
 _NOWHERE_M = 1e4
 """Coordinates of absent models, farther away than any ray reaches."""
+_MARGIN_PX = 2
+"""Pixels around the projected corners of a part in which it is looked for."""
+_NEAREST_M = 1e-3
+"""Depth at which a part in front of the image plane begins."""
 
 
 class Strikes(NamedTuple):
@@ -28,6 +32,22 @@ class Strikes(NamedTuple):
     """Surface normal, (n, 3), world; zero for a ray that hits nothing."""
     geom: NDArray[np.int32]
     """Geom id, (n,); -1 for a ray that hits nothing."""
+
+
+class PartPixels(NamedTuple):
+    """The n pixels that show a part without the others, also outside of the image."""
+
+    rows: Ints
+    columns: Ints
+    distance: Array
+    """Distance along the ray of each, [m]."""
+
+    def fill_image(self, height: int, width: int) -> Array:
+        """The distances of the pixels in the image, (height, width), [m], infinite elsewhere."""
+        image = np.full((height, width), np.inf)
+        inside = (self.rows >= 0) & (self.rows < height) & (self.columns >= 0) & (self.columns < width)
+        image[self.rows[inside], self.columns[inside]] = self.distance[inside]
+        return image
 
 
 def cast_rays(model: Any, data: Any, origin: Array, rays: Array) -> Strikes:
@@ -85,9 +105,11 @@ class ModelRays:
     def __init__(self, solids: Mapping[str, Solid], play_m: float) -> None:
         """Build one movable body for each part, its fits shrunk by the clearance `play_m`."""
         spec = mujoco.MjSpec()
-        for part, solid in solids.items():
+        pieces = {part: shrink_pieces(solid, play_m) for part, solid in solids.items()}
+        for part, each in pieces.items():
             body = spec.worldbody.add_body(name=part, mocap=True)
-            add_pieces(spec, body, shrink_pieces(solid, play_m), {}, f"{part}/")
+            add_pieces(spec, body, each, {}, f"{part}/")
+        self._corners = {part: collect_corners(each)[0] for part, each in pieces.items()}
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         bodies = [self._model.body(part) for part in solids]
@@ -116,3 +138,25 @@ class ModelRays:
         mujoco.mj_kinematics(self._model, self._data)
         strikes = cast_rays(self._model, self._data, origin, rays)
         return strikes.distance, number[self._mocap_of[strikes.geom]]
+
+    def find_pixels(self, part: str, T: Array, view: PinholeView) -> PartPixels:
+        """The pixels of a view that show a part alone at a pose, (4, 4), world; up to one image beyond the image."""
+        (left, top), (right, bottom) = _frame_points(view, pose.apply(T, self._corners[part]))
+        v, u = np.mgrid[top:bottom, left:right]
+        distance, index = self({part: T}, view.origin, view.cast_through(u, v))
+        hit = index == 0
+        return PartPixels(v.ravel()[hit], u.ravel()[hit], distance[hit])
+
+
+def _frame_points(view: PinholeView, points: Array) -> Ints:
+    """The left upper and right lower pixel around points (k, 3), world, (2, 2), each column and row.
+
+    It ends one image beyond the image, or there if a point is behind the camera.
+    """
+    size = np.array([view.width, view.height])
+    local = pose.apply(pose.inverse(view.T_world_view), points)
+    if local[:, 2].min() < _NEAREST_M:
+        return np.array([-size, 2 * size])
+    pixels = local[:, :2] / local[:, 2:] * view.focal + size / 2
+    ends = np.floor(pixels.min(axis=0)) - _MARGIN_PX, np.ceil(pixels.max(axis=0)) + _MARGIN_PX
+    return np.clip(np.array(ends).astype(np.int64), -size, 2 * size)

@@ -1,7 +1,8 @@
 """Control the tip of the arm during an episode: add the actions of an agent to a compliant approach into the hole.
 
 The robot knows its commands, its encoders, the opening of its fingers, the force on the held part and the wrench at its
-wrist. No command depends on the true pose of a part.
+wrist. No command depends on the true pose of a part. The file is long because all methods change one state, the arm
+during an episode.
 """
 
 import math

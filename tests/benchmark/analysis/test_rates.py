@@ -17,7 +17,7 @@ from apo_bench import InputError
 from apo_bench.benchmark.analysis import Rate, compute_wilson_interval, tabulate_confusion, tabulate_effort, tally
 from apo_bench.benchmark.report.report import write_report
 from apo_bench.benchmark.report.tables.methods import summarise_predictions
-from apo_bench.records import RECORD_SCHEMA
+from apo_bench.records import RECORD_SCHEMA, TrialConfig, list_setting_columns
 from tests import pages
 
 UNKNOWN = dict.fromkeys(
@@ -34,30 +34,15 @@ UNCOUNTED = dict.fromkeys(("contacts_true_positive", "contacts_false_negative", 
 def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
     """What statistics looks at in a row."""
     failed = success is False
+    met = 0.0 if method == "oracle" else 1.0
     return {
         "schema": RECORD_SCHEMA,
         "env_id": "APOReplay-v0",
         "config_hash": "0123456789abcdef",
-        "scenario": "stick_in_tower",
-        "clearance_mm": 0.25,
-        "human_error_scale": 0.0 if method == "oracle" else 1.0,
-        "noise_mm": 0.0 if method == "oracle" else 1.0,
-        "noise_deg": 0.0 if method == "oracle" else 1.0,
-        "noise": "isotropic",
-        "contact_source": "given",
-        "grasp": "friction",
-        "fidelity": "full",
-        "arm": "six_axis",
-        "pose_source": "noise-model",
-        "timestep_s": 0.001,
+        **list_setting_columns(TrialConfig("stick_in_tower"), "stick_in_tower"),
+        **dict.fromkeys(("human_error_scale", "noise_mm", "noise_deg"), met),
         "method": method,
-        "max_reobservations": 0,
-        "robot_error": "none",
-        "ft_sensor": "wrist",
-        "assumed_robot_error": "matched",
-        "min_predicted_success": 0.0,
         "seed": seed,
-        "secret_seed": None,
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",
         "success": success,

@@ -137,14 +137,18 @@ def test_the_card_of_insertions_states_every_argument_the_split_and_the_citation
     assert "@software{apo_bench," in card
 
 
-@pytest.mark.parametrize(("form", "policy"), [("lerobot", "expert"), ("minari", None)])
+@pytest.mark.parametrize(
+    ("form", "policy", "pixels"), [("lerobot", "expert", ()), ("lerobot", "expert", ("wrist",)), ("minari", None, ())]
+)
 def test_every_episode_is_the_same_bit_for_bit_when_it_is_made_again(
-    form: str, policy: str | None, tmp_path: Path
+    form: str, policy: str | None, pixels: tuple[str, ...], tmp_path: Path
 ) -> None:
     if form == "minari":
         pytest.importorskip("h5py")
+    if pixels:
+        pytest.importorskip("imageio_ffmpeg")
     for name in "ab":
-        make_dataset(INSERTED[:1], tmp_path / name, "by hand", form, policy)
+        make_dataset(INSERTED[:1], tmp_path / name, "by hand", form, policy, pixels=pixels)
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*") if path.is_file())
     assert len(files) >= 3
     for path in files:

@@ -16,8 +16,9 @@ from apo_bench import InputError, TrialConfig, load_scenario
 from apo_bench.benchmark.datasets.images import make as made
 from apo_bench.benchmark.datasets.images.estimate import estimate_images
 from apo_bench.benchmark.datasets.images.models import ImageObject, make_info_entry, make_model, measure_diameter
-from apo_bench.benchmark.datasets.images.scene import add_depth_noise
+from apo_bench.benchmark.datasets.images.scene import add_depth_noise, disturb_mask
 from apo_bench.benchmark.datasets.images.views import draw_views
+from apo_bench.benchmark.scoring.pose_errors import measure_recall
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_images import ImageConfig, read_cameras, read_image_description
 from apo_bench.formats.bop_models import read_symmetries
@@ -25,7 +26,7 @@ from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import collect_corners, pose, shrink_pieces
 from apo_bench.io import convert_typed
 from apo_bench.records import SecretSeed
-from tests.image_sets import SMALL, list_truth, make
+from tests.image_sets import SMALL, list_truth, make, write_truth
 
 
 @pytest.fixture(scope="module")
@@ -223,6 +224,51 @@ def test_depth_noise_grows_with_the_squared_depth() -> None:
     assert np.mean(near == 0.0) == pytest.approx(0.01, rel=0.2)
     exact = add_depth_noise(np.array([[1.0, np.inf]]), 0.0, rng)
     assert np.array_equal(exact, [[1.0, 0.0]])
+
+
+def test_inexact_detections_move_and_grow_by_their_error() -> None:
+    mask = np.zeros((200, 200), dtype=np.bool_)
+    mask[80:120, 60:140] = True
+    rng = np.random.default_rng(0)
+    found = [np.argwhere(disturb_mask(mask, 3.0, rng)) for _ in range(400)]
+    middles = np.array([(each.max(axis=0) + each.min(axis=0)) / 2 for each in found]) - (99.5, 99.5)
+    sizes = np.array([np.ptp(each, axis=0) + 1 for each in found]) - (40.0, 80.0)
+    # 400 draws state a standard deviation to 3.5 %, and pixels round by 0.3
+    assert middles.std(axis=0) == pytest.approx([3.0, 3.0], rel=0.15)
+    assert sizes.std(axis=0) == pytest.approx([6.0, 6.0], rel=0.15)
+    assert np.abs(middles.mean(axis=0)).max() < 0.7
+    assert disturb_mask(mask, 0.0, rng) is mask
+    assert disturb_mask(mask, 1e4, rng).any()
+
+
+def test_annotations_are_exact_where_detections_are_not(tmp_path: Path) -> None:
+    images = make(tmp_path / "set", "block_on_block", config=replace(SMALL, detection_error_px=3.0))
+    exact = make(tmp_path / "exact", "block_on_block")
+    assert read(images / "detections.json") != read(exact / "detections.json")
+    for name in ("test/000001/scene_gt_coco.json", "test_targets_bop19.json"):
+        assert read(images / name) == read(exact / name)
+
+
+def test_images_between_operations_are_numbered_by_operation_and_are_no_targets(tmp_path: Path) -> None:
+    images = make(tmp_path / "set", "block_on_block", config=replace(SMALL, video_hz=4.0))
+    still = make(tmp_path / "still", "block_on_block")
+    for name in ("detections.json", "test_targets_bop19.json", "test/000001/scene_gt_coco.json"):
+        assert read(images / name) == read(still / name)
+    truth = read(images / "test" / "000001" / "scene_gt.json")
+    assert {path.stem for path in (images / "test" / "000001" / "depth").iterdir()} == {f"{int(k):06d}" for k in truth}
+    for operation in (1, 2):
+        frames = [int(image) for image in truth if int(image) // 10000 == operation]
+        assert frames == [*range(10000 * operation + 1, 10000 * operation + len(frames) + 1)]
+        assert len(frames) > 5
+        shifts = np.array([[entry["cam_t_m2c"] for entry in truth[str(k)]] for k in frames])
+        end = np.array([entry["cam_t_m2c"] for entry in truth[str(operation)]])
+        # one part moved, and the last frame is where the image of the operation shows it, to what parts settle by
+        assert (np.ptp(shifts, axis=0).max(axis=1) > 20.0).sum() == 1
+        assert shifts[-1] == pytest.approx(end, abs=0.5)
+    recalls = [
+        measure_recall(each, read_image_description(each), read_results(write_truth(each))) for each in (images, still)
+    ]
+    assert recalls[0] == recalls[1]
 
 
 def test_the_estimator_finds_parts_in_exact_depth(tmp_path: Path) -> None:

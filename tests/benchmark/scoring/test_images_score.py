@@ -10,6 +10,7 @@ import pytest
 
 from apo_bench import InputError, TrialConfig, run_trial
 from apo_bench.benchmark.scoring.images import score_poses
+from apo_bench.benchmark.scoring.pose_errors import RECALLS
 from apo_bench.cli.app import main
 from apo_bench.formats.bop import EstimatedPose, write_results
 from apo_bench.formats.bop_images import read_cameras, read_image_description
@@ -29,7 +30,7 @@ def test_the_true_poses_succeed_as_the_oracle_does(images: Path, tmp_path: Path)
     assert [row["method"] for row in exact] == ["uncorrected", "contact", "oracle"]
     for row in exact:
         assert (row["scenario"], row["successes"], row["trials"]) == ("fixture_alignment", 2, 2)
-        assert [row[name] for name in ("success", "mssd", "mspd", "add")] == pytest.approx([100.0] * 4)
+        assert [row[name] for name in ("success", *RECALLS)] == pytest.approx([100.0] * 5)
 
 
 def test_wrong_poses_fail_and_are_corrected(tmp_path: Path) -> None:
@@ -95,7 +96,7 @@ def test_a_secret_set_is_scored_with_its_secret_only(tmp_path: Path) -> None:
         score_poses(("contact",), images / "results.csv", tmp_path / "open")
     scored = score_poses(("contact",), images / "results.csv", tmp_path / "closed", secret_seed_file=secret)
     assert {row["method"]: row["successes"] for row in scored} == {"uncorrected": 0, "contact": 0, "oracle": 1}
-    assert all(row["mssd"] is None for row in scored)
+    assert all(row[name] is None for row in scored for name in RECALLS)
 
 
 @pytest.mark.parametrize(

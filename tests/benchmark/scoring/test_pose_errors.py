@@ -75,9 +75,9 @@ def recall(images: Path, path: Path) -> PoseRecall:
 
 def test_recall_of_the_truth_is_one_and_of_nothing_zero(images: Path) -> None:
     targets = sum(each["inst_count"] for each in json.loads((images / "test_targets_bop19.json").read_text()))
-    assert recall(images, write_truth(images)) == pytest.approx((targets, 1.0, 1.0, 1.0))
+    assert recall(images, write_truth(images)) == pytest.approx((targets, 1.0, 1.0, 1.0, 1.0))
     write_results(images / "one.csv", [EstimatedPose((1, 3, 99), 1.0, pose.at((0.0, 0.0, 0.9)), -1.0)])
-    assert recall(images, images / "one.csv") == (targets, 0.0, 0.0, 0.0)
+    assert recall(images, images / "one.csv") == (targets, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_recall_of_shifted_poses_counts_thresholds(images: Path) -> None:
@@ -85,7 +85,10 @@ def test_recall_of_shifted_poses_counts_thresholds(images: Path) -> None:
     visible = [each["obj_id"] for each in json.loads((images / "test_targets_bop19.json").read_text())]
     path = write_truth(images, "far.csv", lambda where, T: pose.at((0.0, 0.0, 0.012)) @ T)
     expected = np.mean([0.9 if number == 3 else 0.8 for number in visible])
-    assert recall(images, path).mssd == pytest.approx(expected)
+    found = recall(images, path)
+    assert found.mssd == pytest.approx(expected)
+    # As many tolerances of VSD hold. Some thresholds do not, of up to 10 % of the pixels, as the silhouettes move.
+    assert expected - 0.2 <= found.vsd <= expected
 
 
 def test_pixels_count_relative_to_the_width_of_the_image(images: Path) -> None:

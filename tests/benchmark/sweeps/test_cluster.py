@@ -18,12 +18,13 @@ from typing import Any
 
 import pytest
 
-from apo_bench import SweepConfig, run_sweep
+from apo_bench import SweepConfig, TrialConfig, run_sweep, run_trial
 from apo_bench.benchmark.sweeps import cluster as on_ray
 from apo_bench.benchmark.sweeps.grid import load_all
 from apo_bench.benchmark.sweeps.user_files import list_user_files_for_nodes
 from apo_bench.cli.app import main
 from apo_bench.resources import folder
+from tests.image_sets import make, write_truth
 
 SPEC = SweepConfig(
     ("carried_bridge",), noise_level=(1.0,), human_error_scale=(0.0,), method=("uncorrected", "paper"), trials=10
@@ -192,6 +193,26 @@ def test_files_below_the_current_folder_travel_and_no_others(
     code = {"code_of_mine.py", "helper_of_mine.py"}
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml"} | code
     assert all((own / name).samefile(path) for name, path in travel.items())
+
+
+def test_pose_results_travel_with_the_trials_and_cameras_of_their_images(
+    own: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A node that has these files alone runs the trial as here."""
+    write_truth(make(own / "images", "block_on_block"))
+    noise = "poses:images/results.csv"
+    config = TrialConfig("block_on_block", noise=noise, human_error_scale=0.0, fidelity="near-contact")
+    here = run_trial(config)
+    travel = list_user_files_for_nodes(load_all([SPEC]), (), (noise,))
+    assert set(travel) == {
+        f"images/{each}" for each in ("results.csv", "apo_trials.json", "test/000001/scene_camera.json")
+    }
+    node = tmp_path_factory.mktemp("node")
+    for name, path in travel.items():
+        (node / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, node / name)
+    monkeypatch.chdir(node)
+    assert run_trial(config) == here
 
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], out: Path) -> str:

@@ -106,13 +106,16 @@ def test_what_only_fasteners_hold_comes_against_its_seat_and_is_clamped(hanging:
     assert run_trial(str(hanging), method="oracle", seed=0, fidelity="near-contact")["success"]
 
 
-def test_a_part_whose_seat_is_not_felt_is_not_clamped(hanging: Path) -> None:
+@pytest.mark.parametrize(("before_mm", "is_clamped"), [(0.3, True), (20.0, False)])
+def test_a_part_is_clamped_if_its_seat_is_felt_at_the_goal_or_a_little_beyond(
+    hanging: Path, before_mm: float, is_clamped: bool
+) -> None:
     scenario = load_scenario(hanging)
     layout = draw_layout(scenario, np.random.default_rng(0))
     goals = np.array(layout.poses)
-    goals[0, :3, 3] += 0.02 * layout.poses[0, :3, 0]  # 20 mm before the wall
+    goals[0, :3, 3] += 1e-3 * before_mm * layout.poses[0, :3, 0]  # before the wall
     reached = replay(
         Plan(scenario.assembly, layout.start, goals), build_scene(scenario), config=ExecutionConfig("near-contact")
     )
     assert reached.reached.final is not None
-    assert reached.reached.final.poses["plate"][2, 3] < 0.02, "it falls onto the floor"
+    assert (reached.reached.final.poses["plate"][2, 3] > 0.02) == is_clamped, "else it falls onto the floor"

@@ -12,7 +12,7 @@ from manifold3d import Manifold
 import apo_bench
 from apo_bench.geometry import measure_intrusion, pose
 from apo_bench.importers.assembly.from_cad import import_parts
-from apo_bench.importers.assembly.misplaced import describe_misplaced
+from apo_bench.importers.assembly.misplaced import describe_overlap, list_misplaced
 from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
 from apo_bench.scenario.parts.making import bore, extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_blocked import made
@@ -27,7 +27,7 @@ def test_a_bump_inside_a_wall_is_cut_off_with_the_clearance_and_the_scenario_sta
     poses, lines, notes = import_parts(files, tmp_path / "parts", "mm")
     assert set(notes) <= set(lines)
     (line,) = (note for note in notes if "no whole face explains it" in note)
-    assert line.startswith("'stand' and 'lug' were drawn 0.3 mm inside each other")
+    assert line.startswith("'stand' and 'lug' are 0.3 mm inside each other as drawn")
     assert "mm^3 of 'lug' are taken off, which leaves 0.25 mm of play" in line
     stand, lug = read_posed(poses)
     shifted = lug.T @ pose.at((-2.4e-4, 0, 1e-6))
@@ -55,7 +55,7 @@ def test_a_pin_that_was_moved_into_the_wall_of_its_hole_is_named(
 ) -> None:
     plate, pin = fitted
     off = 1e-3 * shift_mm * np.array([np.cos(np.radians(deg)), np.sin(np.radians(deg)), 0.0])
-    sentence = describe_misplaced(replace(pin, T=pose.at(off) @ pin.T), plate)
+    sentence = describe_overlap(replace(pin, T=pose.at(off) @ pin.T), plate)
     assert sentence.startswith("'pin' is")
     assert "on one side only" in sentence
 
@@ -64,6 +64,23 @@ def test_what_has_play_or_is_too_thick_all_around_is_not_named(
     fitted: tuple[PosedPart, PosedPart], tmp_path: Path
 ) -> None:
     plate, pin = fitted
-    assert describe_misplaced(pin, plate) == ""
+    assert describe_overlap(pin, plate) == ""
     (thick,) = made(tmp_path, pin=(make_shaft(5.4, 0, 40, "side", bottom="tip", top="head"), (0, 0, 0)))
-    assert describe_misplaced(thick, plate) == ""
+    assert describe_overlap(thick, plate) == ""
+
+
+@pytest.mark.parametrize("shift_mm", [0.5, 2.0])
+def test_a_part_that_was_moved_off_its_seat_or_off_the_axis_of_its_hole_is_named(
+    shift_mm: float, tmp_path: Path
+) -> None:
+    """A pin with play stands on the bottom of its hole; a stud is thicker than its hole, as threads are drawn."""
+    base = extrude(make_rectangle(60, 60), 0, 15, bores=[bore((0, 0), 5.2, 5, 15, "bore")], bottom="under", top="over")
+    hole = base.moved((100, 0, 0))
+    pin, stud = (make_shaft(r, 5, 40, "side", bottom="tip", top="head") for r in (5.0, 5.4))
+    pair = made(tmp_path, base=(base, (0, 0, 0)), pin=(pin, (0, 0, 0)))
+    thread = made(tmp_path, hole=(hole, (0, 0, 0)), stud=(stud, (100, 0, 0)))
+    assert list_misplaced([*pair, *thread]) == []
+    (lifted,) = list_misplaced([pair[0], replace(pair[1], T=pose.at((0, 0, 1e-3 * shift_mm)) @ pair[1].T)])
+    assert "mm away from" in lifted
+    (aside,) = list_misplaced([thread[0], replace(thread[1], T=pose.at((1e-3 * shift_mm, 0, 0)) @ thread[1].T)])
+    assert f"{shift_mm:.2g} mm apart" in aside

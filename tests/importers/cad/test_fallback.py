@@ -30,8 +30,8 @@ def test_a_solid_whose_surface_crosses_itself_becomes_a_part_and_the_report_says
     part = import_solid_anyway(raw, "a", tmp_path, "a.stl")
     assert part.solid.faces
     (repair,) = part.raw.repairs
-    assert "stands for the solid" in repair or "stand for the solid" in repair
-    assert "differ from it by up to" in repair
+    assert "stands for the solid in collisions" in repair
+    assert "mm off at most" in repair
 
 
 def test_coarse_pieces_are_exact_at_faces_that_others_come_near(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from apo_bench import Assembly, Plan
 from apo_bench.assembly import ContactMeasurements, Step, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.attach_line import Attach
+from apo_bench.planning.prediction.arm_move import ArmMove
 from apo_bench.planning.prediction.first_failure import Prediction, predict_failure
-from apo_bench.planning.prediction.plan_measures import ArmMove
 from apo_bench.planning.prediction.rest_poses import is_support, list_residuals, predict_rest_poses
 from apo_bench.records import Thresholds
 from tests import rounds, scenes

@@ -15,14 +15,14 @@ import numpy as np
 from apo_bench.benchmark.datasets.images.make import JOINED_DETECTIONS
 from apo_bench.errors import require
 from apo_bench.formats.bop import EstimatedPose, write_results
-from apo_bench.formats.bop_images import PublishedCamera, SceneEntry, read_cameras, read_image_description
+from apo_bench.formats.bop_images import SceneEntry, read_cameras, read_image_description
 from apo_bench.formats.coco import decode_mask
 from apo_bench.geometry import Array, find_symmetries, pose, shrink_pieces
 from apo_bench.io import group_by, read_plain
 from apo_bench.perception.depth_camera.model_localisation import Appearance, Model, locate_model
 from apo_bench.perception.depth_camera.range_finder import BIAS, PinholeView
 from apo_bench.perception.depth_camera.surface import load_small_gicp, sample_surface
-from apo_bench.scenario import load_scenario
+from apo_bench.simulation.sensor.depth_images import load_solids, make_model_rays, read_distances
 from apo_bench.simulation.sensor.rays import ModelRays
 
 _LARGEST_BYTES = 1_000_000_000
@@ -77,28 +77,14 @@ def estimate_images(images: Path, out: Path) -> int:
 
 def _load_models(scene: SceneEntry) -> _SceneModels:
     """Load the models of the parts of a scenario, as they are made, smaller by the clearance."""
-    solids = load_scenario(scene.scenario).assembly.solids
     clearance_m = 1e-3 * scene.clearance_mm
-    objects = {number: solids[part] for part, number in scene.parts.items()}
     models = {
         number: Model(
             {str(number): np.eye(4)}, sample_surface(shrink_pieces(solid, clearance_m)), find_symmetries(solid)
         )
-        for number, solid in objects.items()
+        for number, solid in load_solids(scene).items()
     }
-    return _SceneModels(models, ModelRays({str(number): solid for number, solid in objects.items()}, clearance_m))
-
-
-def read_distances(path: Path, camera: PublishedCamera) -> tuple[Array, PinholeView]:
-    """Read a depth image as distances along the rays, (height, width), [m], NaN without a reading, and its view."""
-    import imageio.v3 as imageio
-
-    depth = 1e-3 * camera.depth_scale * np.asarray(imageio.imread(path), dtype=np.float64)
-    height, width = depth.shape
-    fov_deg = float(2.0 * np.degrees(np.arctan(height / 2 / camera.K[1, 1])))
-    view = PinholeView(camera.T_world_camera, width, height, fov_deg)
-    slope = (view.rays @ view.T_world_view[:3, 2]).reshape(depth.shape)
-    return np.where(depth > 0.0, depth, np.nan) / slope, view
+    return _SceneModels(models, make_model_rays(scene))
 
 
 def _locate(

@@ -12,7 +12,9 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.benchmark.datasets.images.models import ImageObject, write_models
+from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks, draw_marks
 from apo_bench.benchmark.datasets.images.scene import DEPTH_SCALE, DETECTIONS, write_scene
+from apo_bench.benchmark.datasets.images.video_frames import record_frames
 from apo_bench.benchmark.datasets.images.views import make_view, number_images
 from apo_bench.benchmark.sweeps.pool import make_process_pool
 from apo_bench.benchmark.sweeps.stop_signals import stop_at_signals
@@ -74,13 +76,14 @@ def make_images(
     objects = list_objects(trials, loaded)
     description = describe_images(trials, loaded, objects, config, split)
     _open_folder(out, description)
-    write_models({number: each for each, number in objects.items()}, out)
+    marks = {k: draw_marks(each.pieces, np.random.default_rng(k)) for each, k in objects.items() if config.marks}
+    write_models({number: each for each, number in objects.items()}, marks, out)
     write_file(out / "camera.json", json.dumps(_describe_camera(config), indent=1))
     write_file(out / "README.md", _CARD.format(version=__version__, command=command))
     done = {int(path.parent.name) for path in (out / split).glob(f"*/{DETECTIONS}")}
     left = [(trial.scenario, (number, trial)) for number, trial in enumerate(trials, start=1) if number not in done]
     batches = [several[k : k + _BATCH] for several in group_by(left).values() for k in range(0, len(several), _BATCH)]
-    for sentence in _run(batches, description, out / split, workers):
+    for sentence in _run(batches, (description, marks, out / split), workers):
         say(sentence)
     return _join_scenes(out, split)
 
@@ -161,28 +164,30 @@ def _describe_camera(config: ImageConfig) -> dict[str, Any]:
     return {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2], **size}
 
 
-def _run(batches: Sequence[Batch], description: ImageDescription, folder: Path, workers: int) -> list[str]:
+def _run(batches: Sequence[Batch], how: tuple[ImageDescription, ObjectMarks, Path], workers: int) -> list[str]:
     """Write all batches, in processes if there are several workers; returns sentences about failed demonstrations."""
     if workers == 1 or not batches:
-        return [sentence for batch in batches for sentence in write_batch(batch, description, folder)]
+        return [sentence for batch in batches for sentence in write_batch(batch, *how)]
     with stop_at_signals(), make_process_pool(min(workers, len(batches))) as pool:
-        running = [pool.schedule(write_batch, [batch, description, folder]) for batch in batches]
+        running = [pool.schedule(write_batch, [batch, *how]) for batch in batches]
         return [sentence for future in running for sentence in future.result()]
 
 
-def write_batch(batch: Batch, description: ImageDescription, folder: Path) -> list[str]:
+def write_batch(batch: Batch, description: ImageDescription, marks: ObjectMarks, folder: Path) -> list[str]:
     """Write scenes of one scenario; returns sentences about failed demonstrations."""
     scene = scene_of(batch[0][1])
     config = description.options
     failed = []
     with closing(Photographer(scene, make_view(config, np.eye(4)), not config.no_rgb)) as photographer:
         for number, trial in batch:
-            shown = demonstration_of(trial, scene).demonstration
+            simulated = demonstration_of(trial, scene)
+            shown = simulated.demonstration
             if shown.code != "ok":
                 failed.append(f"{trial.scenario}, seed {trial.seed}: the demonstration failed, so it has no images.")
                 continue
+            frames = record_frames(scene, trial, simulated, config.video_hz) if config.video_hz else {}
             rng = stream(trial.seed, IMAGES, trial.secret_seed)
-            write_scene(photographer, shown, number, description, rng, folder / f"{number:06d}")
+            write_scene(photographer, shown, number, description, rng, marks, frames, folder / f"{number:06d}")
     return failed
 
 

@@ -1,16 +1,19 @@
 """Models of the objects in BOP format: meshes in mm with colours and normals, sizes and symmetries."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks
 from apo_bench.formats.bop_images import MODELS_INFO
 from apo_bench.geometry import (
     Array,
+    Piece,
     Solid,
     build_union_mesh,
     collect_corners,
@@ -20,6 +23,7 @@ from apo_bench.geometry import (
     shrink_pieces,
 )
 from apo_bench.io import write_file
+from apo_bench.simulation.sensor.photographs import PrintedMark
 
 _FOLDERS = "models", "models_eval"
 _FINEST = 0.08
@@ -41,20 +45,48 @@ class ImageObject:
     """The shape in the file."""
 
     @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """Convex pieces of the part as it is made, frame of the part, [m]."""
+        return shrink_pieces(self.solid, 1e-3 * self.clearance_mm)
+
+    @property
     def offset(self) -> Array:
         """The pose of the model in the frame of the part, (4, 4), [m]: the middle of its bounding box."""
-        corners = collect_corners(shrink_pieces(self.solid, 1e-3 * self.clearance_mm))[0]
+        corners = collect_corners(self.pieces)[0]
         return pose.at((corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 
 def make_model(each: ImageObject) -> Any:
     """The mesh of an object, a `trimesh.Trimesh` in mm, with flat faces of one colour."""
-    mesh = build_union_mesh(shrink_pieces(each.solid, 1e-3 * each.clearance_mm))
+    mesh = build_union_mesh(each.pieces)
     mesh.apply_transform(pose.inverse(each.offset))
     mesh.apply_scale(1e3)
     mesh.unmerge_vertices()  # each face has its own corners, and so its own normals
-    mesh.visual.vertex_colors = np.append(np.round(255.0 * np.array(each.color)), 255).astype(np.uint8)
+    mesh.visual.vertex_colors = _as_bytes(each.color)
     return mesh
+
+
+def _as_bytes(color: tuple[float, ...]) -> NDArray[np.uint8]:
+    """A colour from 0 to 1 as red, green, blue and opacity from 0 to 255."""
+    return np.append(np.round(255.0 * np.array(color)), 255).astype(np.uint8)
+
+
+def add_marks(mesh: Any, marks: Iterable[PrintedMark], offset: Array) -> Any:
+    """The mesh of an object, in mm, with its marks, whose frame is that of the part.
+
+    Args:
+        offset: Pose of the model in the frame of the part, (4, 4), [m].
+    """
+    import trimesh
+
+    boxes = []
+    for mark in marks:
+        box = trimesh.creation.box(2.0 * mark.half, pose.inverse(offset) @ mark.T)
+        box.apply_scale(1e3)
+        box.unmerge_vertices()
+        box.visual.vertex_colors = _as_bytes(mark.color)
+        boxes.append(box)
+    return trimesh.util.concatenate([mesh, *boxes])
 
 
 def measure_diameter(points: Array) -> float:
@@ -85,8 +117,12 @@ def make_info_entry(each: ImageObject, vertices: Array) -> dict[str, Any]:
     return entry
 
 
-def write_models(objects: Mapping[int, ImageObject], out: Path) -> None:
-    """Write the folders `models`, and `models_eval` with finer meshes, and their `models_info.json`."""
+def write_models(objects: Mapping[int, ImageObject], marks: ObjectMarks, out: Path) -> None:
+    """Write the folders `models`, and `models_eval` with finer meshes, and their `models_info.json`.
+
+    Args:
+        marks: Those of the meshes in `models`. Symmetries are those of the shapes.
+    """
     described = {}
     for folder in _FOLDERS:
         (out / folder).mkdir(parents=True, exist_ok=True)
@@ -95,7 +131,8 @@ def write_models(objects: Mapping[int, ImageObject], out: Path) -> None:
         described[str(number)] = make_info_entry(each, mesh.vertices)
         fine = mesh.subdivide_to_size(_FINEST * described[str(number)]["diameter"])
         fine.merge_vertices(merge_norm=True)  # so that each counts once in a mean
-        for folder, form in zip(_FOLDERS, (mesh, fine), strict=True):
+        shown = add_marks(mesh, marks.get(number, ()), each.offset)
+        for folder, form in zip(_FOLDERS, (shown, fine), strict=True):
             content = form.export(file_type="ply", vertex_normal=True)
             write_file(out / folder / f"obj_{number:06d}.ply", content)
     for folder in _FOLDERS:

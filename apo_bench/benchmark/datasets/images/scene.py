@@ -2,13 +2,15 @@
 
 import json
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Demonstration, compute_placements
+from apo_bench.assembly import Demonstration, Poses, compute_placements
+from apo_bench.benchmark.datasets.images.printed_marks import ObjectMarks
 from apo_bench.benchmark.datasets.images.views import draw_views, number_images
 from apo_bench.formats.bop_images import CAMERAS, LEAST_VISIBLE, TRUTH, VISIBILITY, ImageDescription
 from apo_bench.formats.coco import encode_mask, make_coco
@@ -31,6 +33,8 @@ def write_scene(
     number: int,
     description: ImageDescription,
     rng: np.random.Generator,
+    marks: ObjectMarks,
+    frames: Mapping[int, Poses],
     out: Path,
 ) -> None:
     """Write the images of a demonstration; the true poses are left out if the trial is secret.
@@ -38,6 +42,7 @@ def write_scene(
     Args:
         number: Of the scene.
         rng: Source of the cameras, their errors, and the noise of the depth images.
+        frames: Number of each further image of the first camera -> poses of the parts; without detections.
         out: Folder of the scene, made here.
     """
     parts = description.scenes[str(number)].parts
@@ -47,13 +52,18 @@ def write_scene(
         (out / folder).mkdir(parents=True, exist_ok=True)
     moments = compute_placements(demonstration.assembly, demonstration.start, demonstration.poses)
     views = draw_views(config, rng)
+    of_parts = {part: marks.get(k, ()) for part, k in parts.items()}
     if config.randomise:
         photographer.vary(rng)
     files: dict[str, dict[int, Any]] = {CAMERAS: {}, TRUTH: {}, VISIBILITY: {}}
     detections: list[dict[str, Any]] = []
-    for image, operation, camera in number_images(len(moments), config.cameras):
-        poses, view = moments[operation - 1], views[camera]
-        photograph = photographer.take(view.true, poses)
+    annotations: list[dict[str, Any]] = []
+    shots = [
+        *((image, moments[k - 1], views[camera]) for image, k, camera in number_images(len(moments), config.cameras)),
+        *((image, poses, views[0]) for image, poses in frames.items()),
+    ]
+    for image, poses, view in shots:
+        photograph = photographer.take(view.true, poses, of_parts)
         depth = add_depth_noise(photograph.depth, config.depth_noise_mm, rng)
         _write_pictures(photograph, depth, image, out, is_secret)
         models = [(k, poses[part] @ description.offset(k)) for part, k in parts.items()]
@@ -61,15 +71,20 @@ def write_scene(
         files[CAMERAS][image] = _describe_camera(view.published)
         files[TRUTH][image] = [_describe_pose(k, pose.inverse(view.true.T_world_view) @ T) for k, T in models]
         files[VISIBILITY][image] = facts
+        if image in frames:
+            continue
         seen = [
-            _make_detection((number, image, k), photograph.visible[part])
+            (k, photograph.visible[part])
             for (part, k), fact in zip(parts.items(), facts, strict=True)
             if fact["visib_fract"] >= LEAST_VISIBLE
         ]
-        detections += sorted(seen, key=lambda each: each["bbox"])  # an order that does not tell equal parts apart
+        seen.sort(key=lambda each: find_box(*np.nonzero(each[1])))  # an order that does not tell equal parts apart
+        annotations += [_make_detection((number, image, k), mask) for k, mask in seen]
+        detected = [(k, disturb_mask(mask, config.detection_error_px, rng)) for k, mask in seen]
+        detections += [_make_detection((number, image, k), mask) for k, mask in detected]
     written: dict[str, Any] = {CAMERAS: files[CAMERAS]} if is_secret else dict(files)
     if not is_secret:
-        written["scene_gt_coco.json"] = make_coco(detections, (config.width, config.height))
+        written["scene_gt_coco.json"] = make_coco(annotations, (config.width, config.height))
     for name, content in (*written.items(), (DETECTIONS, detections)):
         write_file(out / name, json.dumps(content))
 
@@ -87,6 +102,24 @@ def add_depth_noise(depth: Array, noise_mm: float, rng: np.random.Generator) -> 
     unit = rng.standard_normal(depth.shape) + BIAS * rng.standard_normal()
     lost = (rng.random(depth.shape) < _DROPOUTS) & (noise_mm > 0.0)
     return np.where(lost | ~np.isfinite(depth), 0.0, depth + sigma * unit)
+
+
+def disturb_mask(mask: Mask, error_px: float, rng: np.random.Generator) -> Mask:
+    """Move and scale a mask, (height, width), as an inexact detection; one that would leave the image is kept.
+
+    Args:
+        error_px: Standard deviation of its middle per axis, and of half its size, [pixels].
+    """
+    if not error_px:
+        return mask
+    from scipy.ndimage import affine_transform
+
+    where = np.argwhere(mask)
+    middle, half = (where.max(axis=0) + where.min(axis=0)) / 2, (np.ptp(where, axis=0) + 1) / 2
+    shift, growth = error_px * rng.standard_normal(2), error_px * rng.standard_normal()
+    scale = half / np.maximum(half + growth, 1.0)
+    found = affine_transform(mask, scale, middle - scale * (middle + shift), order=0)
+    return found if found.any() else mask
 
 
 def _write_pictures(photograph: Photograph, depth: Array, image: int, out: Path, is_secret: bool) -> None:

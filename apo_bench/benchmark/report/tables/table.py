@@ -166,11 +166,10 @@ def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]
     return [path, beside]
 
 
-def list_condition_columns(path: str = "condition", levels: bool = True) -> tuple[TableColumn, ...]:
+def list_condition_columns(levels: bool = True) -> tuple[TableColumn, ...]:
     """Return the columns that identify a condition: few for people, one per setting for files.
 
     Args:
-        path: Path from an item to its condition.
         levels: Whether the noise level is part of the condition.
     """
     last = (
@@ -183,20 +182,20 @@ def list_condition_columns(path: str = "condition", levels: bool = True) -> tupl
         "min_predicted_success",
     )
     return (
-        TableColumn("scenario", "scenario", f"{path}.scenario", words=True, group=True),
-        TableColumn("", "conditions", f"{path}.description", words=True, group=True),
+        TableColumn("scenario", "scenario", "condition.scenario", words=True, group=True),
+        TableColumn("", "conditions", "condition.description", words=True, group=True),
         *(
-            TableColumn(name, value=f"{path}.{name}")
+            TableColumn(name, value=f"condition.{name}")
             for name in ("clearance_mm", "noise", "contact_source", "human_error_scale")
         ),
         *(
-            (TableColumn("noise_mm", value=f"{path}.noise_mm"), TableColumn("noise_deg", value=f"{path}.noise_deg"))
+            (TableColumn("noise_mm", value="condition.noise_mm"), TableColumn("noise_deg", value="condition.noise_deg"))
             if levels
             else ()
         ),
-        TableColumn("method", "method", f"{path}.method", words=True),
-        *(TableColumn(name, value=f"{path}.{name}") for name in last),
-        *([TableColumn("", "noise level", f"{path}.noise_words")] * levels),
+        TableColumn("method", "method", "condition.method", words=True),
+        *(TableColumn(name, value=f"condition.{name}") for name in last),
+        *([TableColumn("", "noise level", "condition.noise_words")] * levels),
     )
 
 

@@ -107,10 +107,25 @@ def refine_round(start: RoundSurface | None, points: Array, cone: bool) -> Round
     def off(p: Array) -> Array:
         return np.asarray(moved(p).off(points) / size)
 
+    def slopes(p: Array) -> Array:
+        """Return the derivatives of `off`, (k, len(p)): height and distance change with the tilted and shifted axis."""
+        wall = moved(p)
+        height, _, out = wall.polar(points)
+        tilts = np.array([x, y]) - np.outer([x @ wall.axis, y @ wall.axis], wall.axis)
+        tilts /= np.linalg.norm(start.axis + p[0] * x + p[1] * y)
+        shifts = size * np.array([x, y])
+        ahead = np.column_stack([(points - wall.point) @ tilts.T, np.tile(-shifts @ wall.axis, (len(points), 1))])
+        outward = np.column_stack([-height[:, None] * (out @ tilts.T), -out @ shifts.T])
+        columns = [outward - wall.slope * ahead, np.full((len(points), 1), -size)]
+        length = np.hypot(1.0, wall.slope)
+        if cone:
+            columns.append(-(height + wall.slope * wall.off(points) / length)[:, None])
+        return np.asarray(np.column_stack(columns) / (length * size))
+
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
     if len(points) < len(first) or not np.isfinite(off(np.array(first))).all():
         return None
-    solved = least_squares(off, first, method="lm", xtol=1e-10, ftol=1e-8, gtol=1e-14, max_nfev=500)
+    solved = least_squares(off, first, slopes, method="lm", xtol=1e-10, ftol=1e-8, gtol=1e-14, max_nfev=20)
     fitted = moved(solved.x)
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 

@@ -50,12 +50,11 @@ def split_into_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     solids, count = _combine_shells([shell if shell.volume > 0.0 else shell.flip() for shell in found])
     if count < len(found):
         repairs = (*repairs, f"{len(found)} closed shells, some of which go through each other, became {count}")
-    for i, solid in enumerate(solids, start=1):
+    for solid in solids:
         _check_unfolded(path, solid)
-        own_name = name if len(solids) == 1 else f"{name}_{i}"
         fewer = simplify_body(solid)
         plain = fewer if len(fewer.triangles) < _FEWER * len(solid.triangles) else solid
-        yield RawSolid(own_name, plain, (SolidPlace(own_name, np.eye(4)),), repairs)
+        yield RawSolid(name, plain, (SolidPlace(name, np.eye(4)),), repairs)
 
 
 def _list_closed_runs(mesh: Mesh) -> Iterator[Mesh]:

@@ -17,34 +17,31 @@ _MOST_CUTS = 60  # along flat faces
 _MOST_HULLS = 80  # of the whole solid
 
 
-def cut_into_coarse_parts(body: Any, raw: RawSolid, beside: HollowSpace) -> Iterator[CutPart]:
+def cut_into_coarse_parts(body: Any, beside: HollowSpace) -> Iterator[CutPart]:
     """Yield parts whose hulls stand for a solid: exact along flat faces that others come near, coarse elsewhere.
 
     Args:
         body: The solid as a manifold3d body, its round holes filled.
     """
     volume = body.volume()
-    flats = beside.flats[_find_near_faces(raw, beside)]
-    first = list(cut_at_reflex_edges(CutPart(body, np.zeros((0, 4))), beside.size, flats, True, [_MOST_CUTS], volume))
+    whole = CutPart(body, np.zeros((0, 4)))
+    first = list(cut_at_reflex_edges(whole, beside.size, beside.flats, True, [_MOST_CUTS], volume))
     most = max(2, _MOST_HULLS // len(first)) if first else 0
     for part in first:
         yield from bisect_hollow_part(part, beside.size, volume, most)
 
 
-def _find_near_faces(raw: RawSolid, beside: HollowSpace) -> Array:
-    """Return which flat regions other solids come near, (k,); all if the others are unknown."""
+def list_near_flats(raw: RawSolid, others: Any) -> Array:
+    """Return the planes n . x = d of the flat faces that other solids come near, (k, 4); all if they are unknown.
+
+    Args:
+        others: KD tree of points of other solids, or None.
+    """
     flats = [region for region in raw.regions if region.kind == "plane"]
-    if beside.others is None:
-        return np.ones(len(flats), dtype=np.bool_)
     middles = raw.mesh.corners[raw.mesh.triangles].mean(axis=1)
-    reach = [
-        _NEAR_MM + float(np.ptp(raw.mesh.corners[raw.mesh.triangles[r.triangles]], axis=(0, 1)).max()) / 2
-        for r in flats
-    ]
-    return np.array(
-        [
-            np.isfinite(beside.others.query(middles[region.triangles], distance_upper_bound=far)[0]).any()
-            for region, far in zip(flats, reach, strict=True)
-        ],
-        dtype=np.bool_,
-    )
+    near = []
+    for region in flats:
+        reach = _NEAR_MM + float(np.ptp(raw.mesh.corners[raw.mesh.triangles[region.triangles]], axis=(0, 1)).max()) / 2
+        if others is None or np.isfinite(others.query(middles[region.triangles], distance_upper_bound=reach)[0]).any():
+            near.append((*region.direction, region.direction @ region.point))
+    return np.array(near).reshape(-1, 4)

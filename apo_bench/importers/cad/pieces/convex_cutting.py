@@ -1,15 +1,17 @@
 """Cut a solid into convex pieces: along planes of reflex edges, then around round holes, [mm]."""
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import manifold3d
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts
+from apo_bench.importers.cad.joined_solids import split_solid
+from apo_bench.importers.cad.pieces.coarse_parts import cut_into_coarse_parts, list_near_flats
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners, merge_near_points
 from apo_bench.importers.cad.pieces.holes import bore_piece, count_least_pieces
 from apo_bench.importers.cad.pieces.hollow_parts import HollowSpace
@@ -20,8 +22,8 @@ from apo_bench.scenario.parts.limits import MOST_PIECES
 from apo_bench.scenario.parts.mass_checks import group_touching_pieces
 
 _MOST_TRIANGLES = 20_000  # a body with more is simplified first
-_ENTRANCE_MM = 1.0  # a solid nearer to the ends of a hole than this is at its entrance
-_WEDGES = 300
+_INSIDE_MM = 0.05  # a solid deeper in a hole than this comes into it, and does not only cover it
+_WEDGES = 100
 """In an assembly, unused holes are filled if all holes would need more wedges than this."""
 _CRUMB = 1e-3
 """Groups of pieces that touch no others are dropped if they are below this share of the volume of the solid."""
@@ -53,6 +55,24 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
+    cuts = [_cut_connected(each, others, coarse) for each in split_solid(raw)]
+    pieces = tuple(chain.from_iterable(each.pieces for each in cuts))
+    filled = tuple(chain.from_iterable(each.filled for each in cuts))
+    _check_count(len(pieces))
+    return CutSolid(pieces, sum(each.hulls for each in cuts), filled, coarse)
+
+
+def _check_count(pieces: int) -> None:
+    """Raise InputError if a part needs more pieces than it may have."""
+    require(
+        pieces <= MOST_PIECES,
+        f"the shape for collisions needs more than {MOST_PIECES:,} convex blocks, which are the most; leave out "
+        "fillets and free surfaces.",
+    )
+
+
+def _cut_connected(raw: RawSolid, others: Array | None, coarse: bool) -> CutSolid:
+    """Cut a connected solid into convex pieces."""
     body = convert_to_manifold(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
@@ -67,8 +87,9 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
         body = body.simplify(min(1e-3 * size, 0.01))
     hulls = 0
     outlines: list[Array] = []
-    beside = HollowSpace(size, flats, None if others is None else cKDTree(others))
-    parts = cut_into_coarse_parts(body, raw, beside) if coarse else cut_into_convex_parts(body, beside)
+    tree = None if others is None else cKDTree(others)
+    beside = HollowSpace(size, list_near_flats(raw, tree), tree)
+    parts = cut_into_coarse_parts(body, beside) if coarse else cut_into_convex_parts(body, beside)
     for part in cut_at_shoulders(parts, shafts, size):
         rough = merge_near_points(snap_to_planes(list_body_corners(part.body), part.planes, size))
         if len(rough) < 4 or not is_thick(rough):
@@ -81,21 +102,20 @@ def cut_solid(raw: RawSolid, others: Array | None = None, coarse: bool = False) 
         hulls += abs(rough_volume - true + kept_volume - fine_volume) > _LOSS * true
         outlines.append(corners)
     # Most important holes first: those that other solids come near, then the widest.
-    kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
+    used = [_is_used(bore, others) for bore in bores]
+    order = sorted(range(len(bores)), key=lambda k: (used[k], max(bores[k].radii)), reverse=True)
+    kept = [bores[k] for k in order]
     # Unused holes, such as screw holes, are filled from the least important one if all of them need too many wedges.
     most = 0 if coarse else _WEDGES
-    while others is not None and kept and count_least_pieces(kept) > most and not _is_near(kept[-1], others):
+    while others is not None and len(kept) > sum(used) and count_least_pieces(kept) > most:
         kept.pop()
     pieces = _bore_holes(outlines, kept, flats)
     while pieces is None and kept:
         # Fill at least a quarter of the holes, the least important ones.
         kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // count_least_pieces(kept)))]
         pieces = _bore_holes(outlines, kept, flats)
-    if pieces is None:
-        raise InputError(
-            f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
-            "out fillets and free surfaces."
-        )
+    _check_count(MOST_PIECES + 1 if pieces is None else len(pieces))
+    assert pieces is not None
     crumb = (_COARSE_CRUMB if coarse else _CRUMB) * raw.mesh.volume
     whole, lost = _drop_crumbs(list(convert_to_cylinders(pieces, shafts)), crumb)
     return CutSolid(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept), coarse)
@@ -132,10 +152,10 @@ def _bore_holes(outlines: Sequence[Array], bores: Sequence[Region], flats: Array
     return pieces or None
 
 
-def _is_near(bore: Region, others: Array | None) -> bool:
-    """Whether points of other solids, (k, 3), come into a hole or to its entrances."""
+def _is_used(bore: Region, others: Array | None) -> bool:
+    """Whether points of other solids, (k, 3), come into a hole."""
     if others is None:
         return False
     height, distance, _ = bore.polar(others)
-    is_level = (height > bore.span[0] - _ENTRANCE_MM) & (height < bore.span[1] + _ENTRANCE_MM)
+    is_level = (height > bore.span[0] + _INSIDE_MM) & (height < bore.span[1] - _INSIDE_MM)
     return bool((is_level & (distance < max(bore.radii))).any())

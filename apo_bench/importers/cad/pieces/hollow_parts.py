@@ -18,7 +18,7 @@ from apo_bench.importers.cad.solids import Mesh, convert_to_mesh, find_square_ax
 
 _DEEP_MM = 0.02
 """Depth of the surface inside a hull that is allowed where other solids come near."""
-_FAR = 0.005
+_FAR = 0.02
 """Depth that is allowed elsewhere, as a share of the size."""
 _FLUSH_MM = 0.004
 """A point at a smaller depth lies on the hull."""
@@ -37,7 +37,7 @@ class HollowSpace(NamedTuple):
     size: float
     """Size of the solid."""
     flats: Array
-    """Planes of its flat faces, (k, 4)."""
+    """Planes of its flat faces that other solids come near, (k, 4)."""
     others: Any = None
     """KD tree of the points of other solids that come near, at their places or on their paths; None: unknown."""
 

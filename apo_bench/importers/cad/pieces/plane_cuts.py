@@ -23,20 +23,26 @@ _FINE_TRIANGLES = 4000  # a shape with more triangles is simplified before it is
 
 
 def cut_into_convex_parts(solid: Any, beside: HollowSpace) -> Iterator[CutPart]:
-    """Yield parts that are convex, or whose hulls stand for a hollow free-form shape."""
+    """Yield parts that are convex, or whose hulls stand for a hollow shape."""
     volume = solid.volume()
-    yield from refine_pieces(
-        _cut_flats_then_free_form(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size
+    parts = _cut_flats(solid, beside, volume) if beside.others is None else _cut_near_flats(solid, beside, volume)
+    yield from refine_pieces(parts, beside, volume, HAIR * beside.size)
+
+
+def _cut_near_flats(solid: Any, beside: HollowSpace, volume: float) -> Iterator[CutPart]:
+    """Yield the parts of a solid after cuts along the flat faces that other solids come near."""
+    yield from cut_at_reflex_edges(
+        CutPart(solid, np.zeros((0, 4))), beside.size, beside.flats, True, [_MOST_CUTS], volume
     )
 
 
-def _cut_flats_then_free_form(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
+def _cut_flats(solid: Any, beside: HollowSpace, volume: float) -> Iterator[CutPart]:
     """Yield the parts of a solid after cuts along its flat faces, then through free-form shapes.
 
     Args:
-        size, volume: Of the whole solid.
-        flats: Planes of flat faces, (k, 4).
+        volume: Of the whole solid.
     """
+    size, flats = beside.size, beside.flats
     cuts = [_MOST_CUTS]  # cuts left, in a list because `cut_at_reflex_edges` counts it down
     for part in cut_at_reflex_edges(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
         planes = _list_reflex_planes(part.body, size)

@@ -22,7 +22,7 @@ _SPLINE_MM = 5e-4
 
 
 def read_solids(path: Path) -> list[BrepSolid]:
-    """Read a STEP file: each solid once with all of its places, in the order of the file.
+    """Read a STEP file: each solid once with all of its places, in the order of the file, named like its component.
 
     Raises:
         ValueError: The file cannot be read.
@@ -31,25 +31,24 @@ def read_solids(path: Path) -> list[BrepSolid]:
     for product, shape, place in read_leaves(path):
         # Copies share their TShape, so each shape is read once.
         shapes.setdefault(shape.TShape(), (product, shape, []))[2].append(place)
-    return [solid for name, shape, places in shapes.values() for solid in _solids(name, shape, (*places,))]
+    return [
+        BrepSolid(name, faces, (*places,), i)
+        for i, (name, shape, places) in enumerate(shapes.values())
+        for faces in _solids(shape)
+    ]
 
 
-def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[BrepSolid]:
-    """Yield the solids in a shape, and its shells that belong to no solid.
-
-    Args:
-        name: Name of the product; several solids get a number behind it.
-    """
+def _solids(shape: Any) -> Iterator[tuple[BrepFace, ...]]:
+    """Yield the faces of each solid in a shape, and of its shells that belong to no solid."""
     every = [*_shapes_in(shape, TopAbs.TopAbs_SOLID), *_shapes_in(shape, TopAbs.TopAbs_SHELL, TopAbs.TopAbs_SOLID)]
     if not every and any(_shapes_in(shape, TopAbs.TopAbs_FACE)):
         every = [shape]
-    for i, each in enumerate(every, start=1):
+    for each in every:
         box = Bnd.Bnd_Box()
         BRepBndLib.BRepBndLib.Add_s(each, box, False)
         size = 1.0 if box.IsVoid() else float(np.sqrt(box.SquareExtent()))
         BRepMesh.BRepMesh_IncrementalMesh(each, _SAGITTA * size, False, _TRIANGLES_RAD, False)
-        faces = tuple(_face(TopoDS.TopoDS.Face(face)) for face in _shapes_in(each, TopAbs.TopAbs_FACE))
-        yield BrepSolid(name if len(every) == 1 else f"{name}_{i}", faces, places)
+        yield tuple(_face(TopoDS.TopoDS.Face(face)) for face in _shapes_in(each, TopAbs.TopAbs_FACE))
 
 
 def _shapes_in(shape: Any, *kinds: Any) -> Iterator[Any]:

@@ -3,15 +3,18 @@
 import re
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.importers.cad.faces.regions import find_regions
+from apo_bench.importers.cad.joined_solids import join_near_solids, number_solids
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, check_size, check_triangles, read_cad_bytes
 from apo_bench.importers.cad.solids import RawSolid, make_hull_solid, merge_copies, name_regions
 from apo_bench.importers.cad.step.from_brep import raw_of
+from apo_bench.importers.cad.step.surfaces import BrepSolid
 
 STEP_SUFFIXES = (".step", ".stp")
 _MOST_SOLIDS = 200  # in one file
@@ -54,22 +57,37 @@ def read_step(path: Path, unit: str | None, lenient: bool = False) -> tuple[CadF
     for solid in solids:
         size = float(np.ptp(np.concatenate([face.corners for face in solid.faces]), axis=0).max())
         check_size(path, size, f"of a solid in it; unit {own_unit}, stated in the file")
-    raws = list[RawSolid]()
+    components: dict[int, list[RawSolid]] = {}
     left_out = list[str]()
     for solid in solids:
         try:
-            raws.append(raw_of(path, solid))
+            raw_solid = _read_solid(path, solid, lenient)
         except InputError as error:
-            why = str(error).removeprefix(f"{path}: ")
-            if lenient:
-                corners = np.concatenate([face.corners for face in solid.faces])
-                hull = make_hull_solid(solid.name, corners, solid.places, why)
-                raws.append(replace(hull, regions=name_regions(hull.mesh, find_regions(hull.mesh))))
-            elif len(solids) == 1:
+            if lenient or len(solids) == 1:
                 raise
-            else:
-                left_out.append(f"{solid.name}: {why}")
-    return CadFile(own_unit, "stated in the file", tuple(left_out)), merge_copies(raws)
+            left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
+            continue
+        components.setdefault(solid.component, []).append(raw_solid)
+    several = solids[0].component != solids[-1].component
+    joined = (join_near_solids(raws) if several else number_solids(raws) for raws in components.values())
+    raws = merge_copies(map(_find_faces, chain.from_iterable(joined)))
+    return CadFile(own_unit, "stated in the file", tuple(left_out)), raws
+
+
+def _read_solid(path: Path, solid: BrepSolid, lenient: bool) -> RawSolid:
+    """Return a solid with its faces, or if allowed its convex hull where its faces do not close."""
+    try:
+        return raw_of(path, solid)
+    except InputError as error:
+        if not lenient:
+            raise
+        corners = np.concatenate([face.corners for face in solid.faces])
+        return make_hull_solid(solid.name, corners, solid.places, str(error).removeprefix(f"{path}: "))
+
+
+def _find_faces(raw: RawSolid) -> RawSolid:
+    """Return a solid with its faces: those of the file, else fitted to its triangles."""
+    return raw if raw.regions else replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh)))
 
 
 def _unit(raw: bytes) -> str:

@@ -37,8 +37,11 @@ class BrepSolid(NamedTuple):
     """A solid, or a shell that may enclose one, with the places of its copies."""
 
     name: str
+    """The name of its component."""
     faces: tuple[BrepFace, ...]
     places: tuple[SolidPlace, ...]
+    component: int = 0
+    """The number of its component; a component may have several solids."""
 
 
 def is_same_surface(first: BrepFace, second: BrepFace, size: float) -> bool:

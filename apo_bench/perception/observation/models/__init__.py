@@ -18,7 +18,7 @@ from apo_bench.perception.observation.models.outliers import (
     OutlierNoise,
     find_last_observed_poses,
 )
-from apo_bench.perception.observation.models.pose_results import PoseResults, TrialKey, TrialResults, read_pose_results
+from apo_bench.perception.observation.models.pose_results import PoseResults, TrialKey, read_pose_results
 from apo_bench.perception.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.perception.observation.models.shared_bias import BiasNoise
 from apo_bench.perception.observation.models.symmetric_parts import AnyTurnNoise, SymmetricNoise
@@ -56,7 +56,6 @@ __all__ = (
     "StudentT",
     "SymmetricNoise",
     "TrialKey",
-    "TrialResults",
     "TruncatedTails",
     "add_shared_error",
     "compute_log_density_across",

@@ -94,8 +94,9 @@ def write_part(
     source: str,
     licence: str,
     title: str = "",
+    by_sites: bool = True,
 ) -> Path:
-    """Write `NAME.xml` and, unless all pieces are boxes, `NAME.toml`, so that `load_part` returns the same solid.
+    """Write `NAME.xml` and, unless sites suffice, `NAME.toml`, so that `load_part` returns the same solid.
 
     Args:
         density: [kg/m^3].
@@ -103,6 +104,7 @@ def write_part(
         color: Red, green, blue, 0 to 1.
         source: Origin of the shape.
         title: Name for people, in any letters.
+        by_sites: Whether sites name the faces if all pieces are boxes.
 
     Returns:
         The path of `NAME.xml`.
@@ -111,9 +113,9 @@ def write_part(
     require(density > 0.0, f"a density of {density:g} kg/m^3 was given; a number above 0 is allowed.")
     solid = build_solid(name, body)
     path = folder / f"{name}.xml"
-    boxes = all_boxes(solid.pieces)
+    boxes = by_sites and all_boxes(solid.pieces)
     matter = {"density": f"{density:g}", "friction": _join_numbers(friction)} if boxes else {}
-    root = _build_tree(solid, {**matter, "rgba": _join_numbers((*color, 1.0))})
+    root = _build_tree(solid, boxes, {**matter, "rgba": _join_numbers((*color, 1.0))})
     origin = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
     note = f"<!-- {origin} -->\n" if boxes else ""
     indent(root)
@@ -125,14 +127,18 @@ def write_part(
     return path
 
 
-def _build_tree(solid: Solid, attributes: dict[str, Any]) -> Element:
-    """The MJCF document of a part; `attributes` are those of its default geom."""
+def _build_tree(solid: Solid, by_sites: bool, attributes: dict[str, Any]) -> Element:
+    """The MJCF document of a part.
+
+    Args:
+        by_sites: Whether sites name the faces; else the TOML file has them.
+        attributes: Those of the default geom.
+    """
     root = Element("mujoco", model=solid.name)
     default = SubElement(root, "default")
     SubElement(default, "geom", type="box" if all_boxes(solid.pieces) else "mesh", **attributes)
     meshes = [p for p in solid.pieces if isinstance(p, Hull) and p.cylinder is None]
-    # Sites name the faces of a part of boxes; other parts have their faces in the TOML file.
-    if all_boxes(solid.pieces):
+    if by_sites:
         SubElement(default, "site", size="0.0015", group="4")
         SubElement(SubElement(default, "default", {"class": "fit"}), "site", size="0.002", group="4")
     if meshes:
@@ -142,7 +148,7 @@ def _build_tree(solid: Solid, attributes: dict[str, Any]) -> Element:
     body = SubElement(SubElement(root, "worldbody"), "body", name=solid.name)
     for piece in solid.pieces:
         SubElement(body, "geom", name=piece.name, **_write_geom(piece))
-    if all_boxes(solid.pieces):
+    if by_sites:
         for face in solid.faces.values():
             fit = {"class": "fit"} if face.fit else {}
             if not face.name.startswith("auto_"):

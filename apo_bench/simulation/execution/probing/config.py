@@ -1,4 +1,4 @@
-"""The settings of probing: actions, sensor, expected slip, and the calibration estimate that touches update."""
+"""The settings of probing: sensor, expected slip, and the calibration estimate that touches update."""
 
 from dataclasses import dataclass
 from typing import Protocol, final
@@ -6,13 +6,6 @@ from typing import Protocol, final
 from apo_bench.assembly import ProbingResult, Touch
 from apo_bench.geometry import Array
 from apo_bench.records import USUAL_FT_SENSOR
-
-PROBING_ACTIONS = ("square", "touch", "lay", "search")
-"""All probing actions.
-
-`square`: square parts before the pick. `touch`: touch fixed parts with the hand. `lay`: lay parts flat before
-their insertion; from above, they then also touch a wall. `search`: search for the hole if an insertion is stopped.
-"""
 
 
 class CalibrationEstimate(Protocol):
@@ -79,7 +72,11 @@ class CalibrationEstimate(Protocol):
 @final
 @dataclass(frozen=True, eq=False)
 class ProbingConfig:
-    """How a robot probes surfaces to estimate its own errors."""
+    """How a robot probes surfaces to estimate its own errors.
+
+    It squares parts before the pick, touches fixed parts with the hand, lays parts flat before their insertion (from
+    above, they then also touch a wall), and searches for the hole if an insertion is stopped.
+    """
 
     estimate: CalibrationEstimate
     """The calibration estimate before any touch."""
@@ -89,7 +86,5 @@ class ProbingConfig:
     """Seed of the sensor noise."""
     ft_sensor: str = USUAL_FT_SENSOR
     """The sensor at the wrist, as in `parse_ft_noise`."""
-    actions: tuple[str, ...] = PROBING_ACTIONS
-    """The actions in use, of `PROBING_ACTIONS`."""
     pads_m: float = 0.0
     """Standard deviation of the middle between the pads along x of the tip, [m]; 0: it is not probed."""

@@ -52,7 +52,6 @@ class ProbingState:
         """
         none = np.eye(4)
         joints = np.zeros(len(scene.arm.joints))
-        self.actions = probing.actions
         self.plan = plan
         self.has_unknown_pads = probing.pads_m > 0.0
         """Whether the middle between the pads is uncertain, so that they are probed."""

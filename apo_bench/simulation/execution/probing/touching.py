@@ -46,7 +46,7 @@ _HIGH_M = 0.1
 
 
 def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
-    """Tare the wrist sensor and, with the action `touch`, touch the floor, then walls.
+    """Tare the wrist sensor, and touch the floor, then walls.
 
     The calibration estimate is updated after the floor, after the walls, after the two touches with opposite sides of
     the hand, and after those with its two pads.
@@ -56,8 +56,6 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
     """
     robot.stage = TOUCHING
     probing.begin(robot)
-    if "touch" not in probing.actions:
-        return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places, inner_places):
         if places is inner_places and not probing.has_unknown_pads:
