@@ -1,6 +1,6 @@
 """Recall of true poses with Gaussian errors, next to what first-order theory expects of it.
 
-    python benchmarks/expected_recall.py IMAGES RESULTS.csv --mm 2 --deg 2
+    python -m benchmarks.expected_recall IMAGES RESULTS.csv --mm 2 --deg 2
 
 writes the poses as RESULTS.csv, which `bop_toolkit_check.py` reads as well. The expectation needs no estimates: it
 moves the vertices of each visible part by random twists. VSD has none.

@@ -16,11 +16,6 @@ def mujoco_of(folders: Iterable[Path]) -> list[str]:
     return sorted({run["versions"]["mujoco"] for run in _runs(folders)})
 
 
-def count_revisions(folders: Iterable[Path]) -> int:
-    """Count the git revisions of the package that these sweeps ran with."""
-    return len({run["revision"] for run in _runs(folders)})
-
-
 def with_mujoco(page: str, versions: Iterable[str]) -> str:
     """Return the page with the versions of MuJoCo in its last line."""
     return f"{page.rstrip()}\n\n*Simulated with MuJoCo {' and '.join(versions)}.*\n"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 
 import msgspec
 from fields import sentences
@@ -25,8 +24,6 @@ from apo_bench.scenario.parts import stated_properties
 from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.arm import Arm
 
-ROOT = Path(__file__).parents[1]
-EXAMPLE = ROOT / "docs" / "guide" / "sweeps.md"
 POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; default `[0, 0, 0]`"}
 FIT = "`true`: it recedes by the clearance"
 AXIS = {

@@ -14,6 +14,7 @@ from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.box_union import SIDES, unite
 from apo_bench.scenario.parts.fit_faces import mark_fit_faces
 from apo_bench.scenario.parts.making import bore, build_solid, extrude, make_rectangle, make_shaft
+from tests.round_parts import countersunk
 
 
 @pytest.mark.parametrize("clearance_mm", [0.25])
@@ -93,3 +94,14 @@ def test_a_countersink_of_a_fit_hole_widens_with_it():
             at = np.column_stack([1e-3 * radius * np.cos(angle), 1e-3 * radius * np.sin(angle), np.full(90, height)])
             depth = [(piece.planes[:, 3] - at @ piece.planes[:, :3].T).min(axis=1) for piece in pieces]
             assert (np.max(depth, axis=0) > 0.0).all() == inside, (height, radius)
+
+
+def test_a_conical_seat_that_is_fit_recedes_and_its_bore_stays():
+    """A cone of 45 degrees from 3 mm at 14 mm to 9 mm at 20 mm; 0.25 mm across it are 0.35 mm more radius."""
+    pieces = shrink_pieces(mark_fit_faces(countersunk(), {"sink": 0.0}), 2.5e-4)
+    for height_mm, free_mm in ((7.0, 3.0), (16.0, 5.0 + 0.25 * np.sqrt(2.0)), (18.0, 7.0 + 0.25 * np.sqrt(2.0))):
+        for radius_mm, inside in ((free_mm - 0.02, False), (free_mm + 0.02, True)):
+            turn = np.radians(2.5)  # the middle of a side
+            at = 1e-3 * np.array([radius_mm * np.cos(turn), radius_mm * np.sin(turn), height_mm])
+            depth = max((piece.planes[:, 3] - piece.planes[:, :3] @ at).min() for piece in pieces)
+            assert (depth > 0.0) == inside, (height_mm, radius_mm)

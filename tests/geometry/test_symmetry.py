@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench.geometry import Array, Box, Solid, count_folds, find_symmetries, list_quarter_turns, pose
+from apo_bench.geometry.symmetry_search import is_symmetry
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -71,3 +73,16 @@ def test_known_parts(part: Solid, order: int, fold: tuple[int, ...]) -> None:
     assert len(found) == order
     assert tuple(count_folds(found)) == fold
     assert_allclose(found[0], np.eye(4))
+
+
+def test_a_symmetry_keeps_the_centre_the_faces_and_the_volume() -> None:
+    """Each of them alone is not enough."""
+    turn = pose.at((0, 0, 0), (180, 0, 0))
+    bar = scenes.stick()
+    assert is_symmetry(bar, turn)
+    assert not is_symmetry(bar, pose.at((0.001, 0, 0)) @ turn)
+    one_end = {name: face for name, face in bar.faces.items() if name != "pz"}
+    assert not is_symmetry(replace(bar, faces=one_end), turn)
+    (box,) = bar.pieces
+    thick_end = replace(box, name="thick", center=box.center + box.half, half=box.half / 2)
+    assert not is_symmetry(replace(bar, pieces=(box, thick_end)), turn)

@@ -15,7 +15,7 @@ from apo_bench.assembly import ReachedState, compute_placements
 from apo_bench.geometry import pose
 from apo_bench.judging.finished_assembly import list_fixtures
 from apo_bench.records import Thresholds
-from tests import scenes
+from tests import rounds, scenes
 from tests.end_states import (
     CASTLES,
     CLEARANCE_MM,
@@ -241,6 +241,22 @@ def test_parts_that_touch_are_told_apart_by_what_their_contacts_leave_free() -> 
     assert both.success
     long = verdict(TOWER(), [shift("castle1", END, 1.2, 0, 0), shift("castle2", END, 1.2, 0, 0)])
     assert (long.finished.code, long.finished.why[:21]) == ("pushed", "stick against castle1")
+
+
+@pytest.mark.parametrize(
+    ("build", "off_mm", "why"),
+    [
+        (rounds.peg_in_plate, (1, 0, 0), "peg.wall on plate.bore is 1.00 mm off the axis, where 0.35 mm are allowed"),
+        (rounds.countersink, (0, 0, 1), "plug.cone on plate.sink is 0.71 mm off its seat, where 0.1 mm are allowed"),
+        (rounds.on_rim, (0, 0, 1), "plug.cone on plate.rim is 0.71 mm off its seat, where 0.1 mm are allowed"),
+    ],
+)
+def test_a_gap_is_across_the_faces_and_named_after_them(
+    build: Callable[[], scenes.Scene], off_mm: tuple[float, ...], why: str
+) -> None:
+    """Cones of 45 degrees that are 1 mm apart along their axis are 1 mm / sqrt(2) apart."""
+    part = build().assembly.operations[-1].main
+    assert verdict(build(), [shift(part, 2, *off_mm)]).finished.why == why
 
 
 def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:

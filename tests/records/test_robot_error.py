@@ -11,6 +11,7 @@ from apo_bench.records import (
     parse_assumed_error,
     parse_robot_error,
 )
+from apo_bench.records.robot_error import Sigmas
 
 
 @pytest.mark.parametrize(
@@ -26,6 +27,10 @@ from apo_bench.records import (
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) -> None:
     assert normalise_robot_error(given) == spelled == normalise_robot_error(spelled)
     assert parse_robot_error(given) == parse_robot_error(spelled)
+
+
+def test_what_is_not_stated_is_zero() -> None:
+    assert Sigmas() == parse_robot_error("none")
 
 
 @pytest.mark.parametrize(
