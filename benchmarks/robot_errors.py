@@ -50,7 +50,6 @@ Every trial draws its own [named errors](../guide/robot-error.md#errors-of-the-r
 robot assumes these. Unnamed errors are fixed: the script changes the simulated robot, and `contact+probe` assumes
 `unknown`. Heights count over the targets; those of an arm that sags grow with its reach.
 
-The counts of `contact+probe` and `oracle` for the first five rows come from sweeps of earlier revisions.
 """
 NAMED = (
     *("none", "hand_eye:1/0.2", "joints:0.05", "tool:0.5", "in_hand:0.5/1"),

@@ -166,7 +166,7 @@ def _transfer(
     held = sum(weight[p] for p in operation.moves)
     ways = list_entrance_distances(assembly, comes, after, into.direction)
     # A hand that does not hold firmly, or has little room, is slow from the first entrance on.
-    quick = holds_firmly(scene.arm) and scene.clearance_mm >= _ROOM_MM
+    quick = False
     first = 0.0 if quick else max(ways, default=0.0)
     clamps = list_clamps(scene.scenario)
     clamps_to = clamps.get(part, "") if operation.clamped and not undo else ""
