@@ -49,6 +49,8 @@ _PUSHED_N = 0.5  # external force above which contact may hold the arm off its c
 _LEVEL_S = 0.2  # duration of this correction
 _SWING_S = 0.25
 """Time simulated before held parts may touch something on a guarded motion: until then they swing in the hand."""
+_GENTLY = 0.3
+"""Share of their speed at which fingers close on a part: both pads meet it at once, and would tilt it at full speed."""
 _SAG_STEPS = 25  # physics steps between two poses for which the sag of the joints is computed
 
 
@@ -258,14 +260,15 @@ class Robot:
     def fingers(self, to: float) -> None:
         """Move both fingers to an opening, [m], and wait until they rest; a part between them limits the motion.
 
-        The command moves at the speed limit of the fingers. If it lies inside a part, the fingers press with at most
-        their force limit.
+        The command moves at the speed limit of the fingers, more slowly where they close on a part. If it lies inside a
+        part, the fingers press with at most their force limit.
         """
         fingers = self._fingers
         # Begin at the command nearest to `to` at which the fingers push as they do now: their force is limited.
         opening = self.opening()
         start = min(max(fingers.commanded(self.data), opening - fingers.slack), opening + fingers.slack)
-        ticks = max(1, round(abs(to - start) / self.arm.limits.fingers_m_s / TICK_S))
+        speed = self.arm.limits.fingers_m_s * (_GENTLY if to < opening and self.forces.held else 1.0)
+        ticks = max(1, round(abs(to - start) / speed / TICK_S))
         if self.fidelity == "near-contact" and not self.forces.held:
             # Nothing may be near the empty hand, neither as it is nor with its fingers where they go.
             moving = moving_with_tip(self.scene, self.data, self.tip(), max(to, opening), ())
