@@ -145,7 +145,7 @@ def import_solid(
         try:
             path, solid = _write_checked(name, replace(body, moments=moments), folder, stated, refused)
             break
-        except InputError as error:
+        except _FaultyPart as error:
             fault = error
     else:  # no moments gave a part that could be read
         raise InputError(
@@ -153,6 +153,10 @@ def import_solid(
         ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
+
+
+class _FaultyPart(Exception):
+    """A written part whose shape for collisions does not agree with the solid."""
 
 
 def _write_checked(
@@ -165,7 +169,8 @@ def _write_checked(
         refused: Gets the omitted faces with the reason.
 
     Raises:
-        InputError: The part cannot be read back.
+        InputError: The part cannot be written.
+        _FaultyPart: It cannot be read back.
     """
     while True:
         path = write_part(name, body, folder, **stated)
@@ -176,7 +181,7 @@ def _write_checked(
             path.with_suffix(".toml").unlink(missing_ok=True)
             face = _FACE_AT_FAULT.search(str(error))
             if face is None or face[1] in refused:
-                raise
+                raise _FaultyPart from error
             refused[face[1]] = str(error).split(": ", 1)[-1].split("; ")[0]
             body = _remove_faces(body, {face[1]})
 
