@@ -36,6 +36,9 @@ def test_a_cheat_scores_no_more_than_who_knows_the_scenario_by_heart(
         assert main(command) == 0
         return read_entry(tmp_path / f"{name}.json").tracks["bracket"].score
 
+    secret = tmp_path / "secret_seed"
+    secret.write_text(f"{bytes(range(32)).hex()}\n")  # of a random one, a guess may be right by luck
+    secret.chmod(0o600)
     salted = ("--secret-seed-file", "secret_seed")
     assert score("public", "cheat:cheat") == 100.0
     by_heart = score("by_heart", "nominal", *salted)
