@@ -16,7 +16,6 @@ from apo_bench.simulation.execution import (
     Move,
     Transfer,
     compute_transferred_poses,
-    holds_firmly,
     plan_moves,
     solve_key_angles,
 )
@@ -69,7 +68,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
         collides_with=collides_with,
         collision_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
-        beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),
+        beside_mm=_beside_mm(scene, T_tip, held, not t.into.level),
         margin_deg=float(np.degrees(np.min(list(map(scene.kinematics.limit_margins, path))))),
     )
 

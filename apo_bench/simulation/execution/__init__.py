@@ -7,7 +7,7 @@ from apo_bench.simulation.execution.execution import Execution
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M, check_hold, depart, release
 from apo_bench.simulation.execution.grasp_clearance import RestingPart, Stroke, find_clear_grasp, list_obstacles
 from apo_bench.simulation.execution.grasp_frame import make_tip_frame
-from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, plan_moves, solve_key_angles
+from apo_bench.simulation.execution.prepare import Move, in_reach, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState, restore_state, save_state
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
@@ -44,7 +44,6 @@ __all__ = (
     "find_clear_grasp",
     "find_hover_pose",
     "finish_attach",
-    "holds_firmly",
     "in_reach",
     "list_obstacles",
     "make_tip_frame",

@@ -20,7 +20,6 @@ from apo_bench.planning.insertion.insertion_geometry import (
     measure_slow_stretch,
 )
 from apo_bench.scenario.attach_lines import list_nominal_operations
-from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.execution.flat_placement import find_flat_placement
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
 from apo_bench.simulation.execution.side_touches import find_side_touches
@@ -43,11 +42,6 @@ _GRAVITY = 9.81  # [m/s^2]
 _PLACE_WEIGHTS = 6.0  # guard of putting down, in weights of the moved parts
 _INSERT_WEIGHTS = 2.5  # guard of an insertion, in weights of the lightest part that it could push along
 _SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the side: friction of 0.8 holds 0.8 of them
-_FIRM_N = 80.0
-"""Least friction force of both pads with which a part passes all entrances but the last at speed, such as the bore of
-an upper plate. The rim strikes the part with some 30 N, which would shift it in a weaker hand, and shift the plate."""
-_ROOM_MM = 0.2
-"""Least clearance with which it does so: at that speed the tip is up to 0.3 mm off its line."""
 _SEAT_N = 2.0  # least force limit of a motion that ends on the seat of a part that is clamped to a fixed one
 _CARRIES = 0.1
 """A face carries weight if the vertical component of its normal is at least this."""
@@ -165,9 +159,8 @@ def _transfer(
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     ways = list_entrance_distances(assembly, comes, after, into.direction)
-    # A hand that does not hold firmly, or has little room, is slow from the first entrance on.
-    quick = False
-    first = 0.0 if quick else max(ways, default=0.0)
+    # Slow from the first entrance on: at full speed the tip is up to 0.3 mm off its line, and strikes the rim.
+    first = max(ways, default=0.0)
     clamps = list_clamps(scene.scenario)
     clamps_to = clamps.get(part, "") if operation.clamped and not undo else ""
     loose = [p for p in list_neighbours(contacts, operation.moves) if p in weight and p not in clamps]
@@ -201,11 +194,6 @@ def _transfer(
     )
 
 
-def holds_firmly(arm: Arm) -> bool:
-    """Whether a hand may carry a part past the first of several entrances at speed; that of the default arm may."""
-    return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
-
-
 def _with_probing(assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses) -> Transfer:
     """Return the transfer of a robot that probes.
 
@@ -220,7 +208,6 @@ def _with_probing(assembly: Assembly, scene: Scene, k: int, t: Transfer, estimat
     return replace(
         t,
         in_last=True,
-        slow=t.slow if t.into.level else max(t.slow, max(t.entrances, default=0.0) + WALL_MARGIN_M),
         squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if free else (),
         flat=flat,
         side_touches=side_touches,
