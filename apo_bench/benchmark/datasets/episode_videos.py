@@ -1,7 +1,4 @@
-"""Write the images of episodes as videos of a LeRobot data set v3.0: one MP4 for each episode and camera.
-
-Needs the package imageio-ffmpeg.
-"""
+"""Write the images of episodes as videos of a LeRobot data set v3.0: one MP4 for each episode and camera."""
 
 from collections.abc import Mapping
 from pathlib import Path

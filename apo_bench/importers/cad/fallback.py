@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from shapely.errors import ShapelyError
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, Hull, Solid
+from apo_bench.geometry import Array, Hull, Solid, measure_depth_inside
 from apo_bench.importers.cad.near_points import sample_surface_points
 from apo_bench.importers.cad.part_import import ImportedPart, import_solid
 from apo_bench.importers.cad.pieces.convex_cutting import CutSolid, cut_solid
@@ -67,6 +67,5 @@ def measure_deviation(raw: RawSolid, solid: Solid) -> float:
     """Return how far the surface of a solid lies inside its pieces, or outside of all of them, at most, [mm]."""
     points = sample_surface_points(raw.mesh, _STEP_MM)
     points = 1e-3 * points[:: max(1, len(points) // _MOST_POINTS)]
-    # The depth of each point in each piece, negative outside; (pieces, points).
-    depth = np.array([(piece.planes[:, 3] - points @ piece.planes[:, :3].T).min(axis=1) for piece in solid.pieces])
+    depth = np.array([measure_depth_inside(piece, points) for piece in solid.pieces])
     return 1e3 * float(np.abs(depth.max(axis=0)).max())

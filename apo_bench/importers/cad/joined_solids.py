@@ -14,8 +14,9 @@ from apo_bench.importers.cad.solids import (
     find_connected_groups,
     simplify_body,
 )
+from apo_bench.scenario.parts.mass_checks import APART_M
 
-_NEAR_MM = 1.0
+_NEAR_MM = 1e3 * APART_M
 """Solids of one component that are nearer to each other are one part."""
 
 

@@ -11,7 +11,7 @@ from apo_bench.scenario.parts.part_file import PartFile
 
 _TOUCHING_M = 2e-5
 """Pieces with a smaller gap touch."""
-_APART_M = 1e-3
+APART_M = 1e-3
 """Pieces with a larger gap make separate solids; the balls of a bearing have a smaller one."""
 _SHARE = 1e-3
 """Largest relative error of the stated volume."""
@@ -74,7 +74,7 @@ def _measure_gap(a: Piece, b: Piece) -> float:
 def check_part(file: PartFile, solid: Solid) -> None:
     """Raise an `InputError` unless the stated properties of a part agree with its pieces."""
     if file.stated is not None:
-        count = len(group_touching_pieces(solid.pieces, _APART_M))
+        count = len(group_touching_pieces(solid.pieces, APART_M))
         require(count == 1, f"{file.path}: the pieces make {count} separate solids; a part is one rigid piece.")
         stated = file.path.with_suffix(".toml")
         check_matter(solid, str(stated), check_faces(solid, stated))
