@@ -40,7 +40,7 @@ def test_everything_can_be_listed(capsys: pytest.CaptureFixture[str]) -> None:
         ("method", (*METHODS, "spiral-search")),
         ("noise", ("isotropic", "outliers", "megapose-lmo")),
         ("arm", ("six_axis", "ur5e_primitive")),
-        ("track", ("given", "robot", "tight")),
+        ("track", ("given", "robot", "(tight)")),
     ):
         code, out, err = run(capsys, group, "list")
         assert (code, err) == (0, "")
