@@ -4,7 +4,9 @@ Where contact stops the part, the tip moves in steps along a growing ellipse who
 standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
 steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
 and the part can drop. Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part
-is soon stopped again, that was no hole: it is drawn back, and the search goes on.
+is soon stopped again, that was no hole: it is drawn back, and the search goes on. Where it is stopped beyond a hole, side
+forces are those of this hole and of what moves along with it: they say nothing of the next one. The search is then a
+circle, and each step makes up for what the tip yielded, until the part dips in.
 """
 
 import math
@@ -34,6 +36,7 @@ _PITCH_MM = 0.35  # between turns
 _TURNS = 1.5  # turns, in pitches of the smaller half axis,
 _LEAST_TURNS = 2  # but at least these
 _STEP_MM = 0.35  # along the ellipse
+_LONGEST_MM = 0.5  # greatest step
 _YAWS = (0.0, 1.0, -1.0, 2.0, -2.0)  # turns about the axis, one for each search, in stated standard deviations
 _REST = 1  # actions after each step
 _CALM = 25  # actions without resistance for which the approach goes on alone
@@ -42,6 +45,10 @@ _FRICTION = 0.8  # side force that friction explains, as a share of the push,
 _MARGIN_N = 0.5  # and on top of this share: beyond both, walls hold the part
 _YIELD_MM_N = 0.6  # displacement of the tip by a side force with each action
 _YIELD_MM = 0.2  # greatest displacement of an action
+_HOLES = 2.0  # error relative to the next hole, where one holds the part, in those relative to the mean of both
+_DIP_MM = 0.05  # depth beyond a stop from which the part dips into the next hole
+_LIFT_N = 0.3  # side force of what is lifted or drawn along
+_WALL_N = 1.5  # side force of walls, on top of friction, beyond which a step waits
 _NOISE_N = 0.02  # side force that is noise
 _RUB_N = 0.06  # side force above which the part waits
 _FREE_MM = 1.5  # progress of an action in free air
@@ -67,13 +74,17 @@ class Searcher:
         self._waited = 0  # actions since then
         self._stopped = math.inf  # distance left where contact stopped the part, [mm]
         self._press = 0.0  # push at that moment, [N]
+        self._tip = np.zeros(2)  # of the front of the part, by the encoders, [mm]
         self._middle = np.zeros(2)  # of the ellipse, [mm]
+        self._aim = np.zeros(2)  # on the ellipse, [mm]
+        self._held = False  # whether a hole holds the part
         self._angle = 0.0  # along the ellipse, [rad]
         self._searches = 0  # that are over
         self._calm = 0  # actions without resistance
         self._rested = 0  # actions since the last step
 
     def __call__(self, observation: Mapping[str, Any]) -> Array:
+        self._tip = np.asarray(observation["agent_pos"][:2], np.float64)
         self._read(np.asarray(observation["wrench"], np.float64), float(observation["plan"][3]))
         ahead = self._phase(np.asarray(observation["plan"][6:12], np.float64))
         return aim_at(self._env, self._target, ahead)
@@ -109,7 +120,8 @@ class Searcher:
                 self._step(deviations)
             return -1.0
         if abs(deeper) > _AGAIN_MM:
-            self._middle = self._target[:2].copy()
+            self._held = _HOLE_MM < deeper < math.inf
+            self._middle = self._aim = self._tip
             self._angle = 0.0
             self._searches = 0
         self._phase = self._search
@@ -130,17 +142,30 @@ class Searcher:
             self._phase = self._advance
             self._best, self._waited = self._left, 0
             return 0.0
-        self._middle += self._yielded(_FRICTION * max(self._push, 0.0) + _MARGIN_N)
-        self._calm = self._calm + 1 if self._push < self._press / 4 else 0
+        if self._is_told:
+            self._middle = self._middle + self._yielded(self._friction + _MARGIN_N)
+        lifts = not self._is_told and math.hypot(*self._side) > _LIFT_N
+        self._calm = self._calm + 1 if self._push < self._press / 4 and not lifts else 0
         self._rested += 1
         if self._rested > _REST and not 0 < self._calm < _CALM:
             self._rested = 0
             self._step(deviations)
         return 0.0
 
+    @property
+    def _is_told(self) -> bool:
+        """Whether side forces are those of the hole that is searched."""
+        return not self._held or self._left < self._stopped - _DIP_MM
+
+    @property
+    def _friction(self) -> float:
+        """Greatest side force that friction explains, [N]."""
+        return _FRICTION * max(self._push, 0.0)
+
     def _step(self, deviations: Array) -> None:
         """Move on along the ellipse; begin the next, larger one at its end, to the other side and with another turn."""
-        axes = np.clip(_SIGMAS * deviations[:2] - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
+        sigmas = np.full(2, _HOLES * deviations[:2].min()) if self._held else deviations[:2]
+        axes = np.clip(_SIGMAS * sigmas - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
         turns = max(math.ceil(_TURNS * float(axes.min()) / _PITCH_MM), _LEAST_TURNS)
         whole = 2 * math.pi * turns
         if self._angle > whole:
@@ -150,7 +175,11 @@ class Searcher:
         share = self._angle / whole  # of the largest ellipse
         self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
         aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
-        self._target[:2] = self._middle + self._angle / whole * aside
+        before = self._aim if self._is_told else self._tip
+        self._aim = self._middle + self._angle / whole * aside
+        if self._is_told or math.hypot(*self._side) < self._friction + _WALL_N:
+            ahead = self._aim - before
+            self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), 1e-9))
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
 
     def _yielded(self, beyond: float) -> Array:
