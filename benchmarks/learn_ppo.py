@@ -1,10 +1,10 @@
 """Reinforcement learning in `APOInsert-v0`, an example: `python -m benchmarks.learn_ppo`.
 
-Needs Stable-Baselines3 and PyTorch. The robot has a hand-eye error of 0.5 mm and 0.1 degrees. The policy searches for
-the hole: it decides at 5 Hz while the part does not advance, and elsewhere the approach goes on with its last action. In
-training an episode ends with a reward of 1 where the part is 5 mm inside. Then the judge decides in evaluation trials,
-after the release: of the approach alone, of the untrained policy, and of the trained one, each with its mean action and
-with random ones. The settings are those of Stable-Baselines3, with normalised observations; nothing is tuned.
+Needs Stable-Baselines3 and PyTorch. The policy searches for the hole: it decides at 5 Hz where the part does not
+advance; elsewhere the approach goes on with its last action. In training an episode ends with a reward of 1 where the
+part is 5 mm inside. In evaluation trials the judge decides after the release: on the approach alone, on the untrained
+policy, and on the trained one by its mean and by its random actions. The settings are those of Stable-Baselines3, with
+normalised observations; nothing is tuned.
 """
 
 from __future__ import annotations

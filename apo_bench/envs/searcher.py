@@ -4,9 +4,11 @@ Where contact stops the part, the tip moves in steps along a growing ellipse who
 standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
 steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
 and the part can drop. Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part
-is soon stopped again, that was no hole: it is drawn back, and the search goes on. Where it is stopped beyond a hole, side
-forces are those of this hole and of what moves along with it: they say nothing of the next one. The search is then a
-circle, and each step makes up for what the tip yielded, until the part dips in.
+is soon stopped again, that was no hole: it is drawn back, and the search goes on.
+
+Where a hole holds the part already, side forces are those of this hole, and of its part, which moves along: they say
+nothing of the next hole. There the search is a circle, and each step makes up for what the tip yielded, until the part
+dips in.
 """
 
 import math
@@ -36,7 +38,7 @@ _PITCH_MM = 0.35  # between turns
 _TURNS = 1.5  # turns, in pitches of the smaller half axis,
 _LEAST_TURNS = 2  # but at least these
 _STEP_MM = 0.35  # along the ellipse
-_LONGEST_MM = 0.5  # greatest step
+_LONGEST_MM = 0.5  # greatest step where a hole holds the part
 _YAWS = (0.0, 1.0, -1.0, 2.0, -2.0)  # turns about the axis, one for each search, in stated standard deviations
 _REST = 1  # actions after each step
 _CALM = 25  # actions without resistance for which the approach goes on alone
@@ -175,11 +177,13 @@ class Searcher:
         share = self._angle / whole  # of the largest ellipse
         self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
         aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
-        before = self._aim if self._is_told else self._tip
-        self._aim = self._middle + self._angle / whole * aside
-        if self._is_told or math.hypot(*self._side) < self._friction + _WALL_N:
-            ahead = self._aim - before
-            self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), 1e-9))
+        aim = self._middle + self._angle / whole * aside
+        if self._is_told:
+            self._target[:2] += aim - self._aim
+        elif math.hypot(*self._side) < self._friction + _WALL_N:
+            ahead = aim - self._tip
+            self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), _LONGEST_MM))
+        self._aim = aim
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
 
     def _yielded(self, beyond: float) -> Array:
