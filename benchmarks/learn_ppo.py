@@ -67,7 +67,7 @@ class Entrance(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 def make(scenario: str, noise_level: float, trains: bool) -> Any:
     """Make the environment for training, or for evaluation by the judge."""
-    more = {"scenario": scenario, "noise_level": noise_level, "layouts": LAYOUTS, "first_trial": FIRST}
+    more: dict[str, Any] = {"scenario": scenario, "noise_level": noise_level, "layouts": LAYOUTS, "first_trial": FIRST}
     env = gymnasium.make("APOInsert-v0", disable_env_checker=True, **more, **SIZES)
     if trains:
         env = Entrance(gymnasium.wrappers.TimeLimit(env, MOST_PERIODS))
