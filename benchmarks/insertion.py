@@ -27,7 +27,6 @@ PAGE = ROOT / "docs" / "guide" / "insertion.md"
 BEGIN = "<!-- table: python -m benchmarks.insertion -->"
 END = "<!-- end of table -->"
 SCENARIOS = ("stick_in_tower", "dovetail", "peg_in_hole", "shaft_through_brackets", "l_bracket_on_plate")
-"""Nothing was tuned on the last two."""
 POLICIES = ("straight", "spiral", "searcher", "probe")
 FIRST = 800
 COLUMNS = ("scenario", "policy", "trial", "success", "reason", "code", "actions", "deepest_mm", "peak_force_n")
