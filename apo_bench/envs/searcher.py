@@ -3,8 +3,9 @@
 Where contact stops the part, the tip moves in steps along a growing ellipse whose axes are proportional to the stated
 standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
 steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
-and the part can drop. Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part
-is soon stopped again, that was no hole: it is drawn back, and the search goes on.
+and the part can drop. Where walls hold the part in place, the search begins again with another turn about the axis.
+Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part is soon stopped again,
+that was no hole: it is drawn back, and the search goes on.
 
 Where a hole holds the part already, side forces are those of this hole, and of its part, which moves along: they say
 nothing of the next hole. There the search is a circle, and each step makes up for what the tip yielded, until the part
@@ -50,7 +51,7 @@ _YIELD_MM = 0.2  # greatest displacement of an action
 _HOLES = 2.0  # error relative to the next hole, where one holds the part, in those relative to the mean of both
 _DIP_MM = 0.05  # depth beyond a stop from which the part dips into the next hole
 _LIFT_N = 0.3  # side force of what is lifted or drawn along
-_WALL_N = 1.5  # side force of walls, on top of friction, beyond which a step waits
+_WALL_N = 1.5  # side force on top of friction at which walls hold the part in place
 _NOISE_N = 0.02  # side force that is noise
 _RUB_N = 0.06  # side force above which the part waits
 _FREE_MM = 1.5  # progress of an action in free air
@@ -77,6 +78,7 @@ class Searcher:
         self._stopped = math.inf  # distance left where contact stopped the part, [mm]
         self._press = 0.0  # push at that moment, [N]
         self._tip = np.zeros(2)  # of the front of the part, by the encoders, [mm]
+        self._first = np.zeros(2)  # where the search began, [mm]
         self._middle = np.zeros(2)  # of the ellipse, [mm]
         self._aim = np.zeros(2)  # on the ellipse, [mm]
         self._held = False  # whether a hole holds the part
@@ -123,7 +125,7 @@ class Searcher:
             return -1.0
         if abs(deeper) > _AGAIN_MM:
             self._held = _HOLE_MM < deeper < math.inf
-            self._middle = self._aim = self._tip
+            self._first = self._middle = self._aim = self._tip
             self._angle = 0.0
             self._searches = 0
         self._phase = self._search
@@ -151,6 +153,8 @@ class Searcher:
         self._rested += 1
         if self._rested > _REST and not 0 < self._calm < _CALM:
             self._rested = 0
+            if not self._held and math.hypot(*self._side) > self._friction + _WALL_N:
+                self._begin_turned()
             self._step(deviations)
         return 0.0
 
@@ -164,15 +168,24 @@ class Searcher:
         """Greatest side force that friction explains, [N]."""
         return _FRICTION * max(self._push, 0.0)
 
+    def _begin_turned(self) -> None:
+        """Search again from the beginning with another turn, since walls hold the part, which does not go in."""
+        self._middle = self._first
+        self._begin_ellipse()
+
+    def _begin_ellipse(self) -> None:
+        """Begin the next ellipse: a larger one, to the other side and with another turn."""
+        self._searches += 1
+        self._angle = 0.0
+
     def _step(self, deviations: Array) -> None:
-        """Move on along the ellipse; begin the next, larger one at its end, to the other side and with another turn."""
+        """Move on along the ellipse; begin the next one at its end."""
         sigmas = np.full(2, _HOLES * deviations[:2].min()) if self._held else deviations[:2]
         axes = np.clip(_SIGMAS * sigmas - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
         turns = max(math.ceil(_TURNS * float(axes.min()) / _PITCH_MM), _LEAST_TURNS)
         whole = 2 * math.pi * turns
         if self._angle > whole:
-            self._searches += 1
-            self._angle = 0.0
+            self._begin_ellipse()
         along = math.hypot(axes[0] * math.sin(self._angle), axes[1] * math.cos(self._angle))  # for each radian
         share = self._angle / whole  # of the largest ellipse
         self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)

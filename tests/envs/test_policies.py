@@ -55,6 +55,7 @@ def observe(
     plan = np.zeros(19)
     plan[3] = left
     plan[6:8] = deviations
+    plan[11] = 1.0
     return {"agent_pos": np.array([*tip, *np.zeros(11)]), "wrench": np.array([*side, -push, 0, 0, 0]), "plan": plan}
 
 
@@ -84,9 +85,16 @@ def test_the_searcher_moves_only_against_resistance_and_rests_after_each_step(en
 
 
 def test_the_searcher_follows_walls_that_hold_the_part_and_no_friction(env: APOInsert) -> None:
-    for side, follows in ((0.8, False), (3.0, True)):
+    for side, follows in ((0.8, False), (1.8, True)):
         ends = 4.0 * stop(Searcher(env), 60, deviations=(0.1, 0.1), side=(side, 0.0))[:, 0]
         assert (ends[-1] - ends[4] > 0.5) == follows
+
+
+def test_the_searcher_begins_again_with_another_turn_where_walls_hold_the_part_in_place(env: APOInsert) -> None:
+    friction, walls = (stop(Searcher(env), 30, side=(side, 0.0)) for side in (1.8, 4.0))
+    assert np.ptp(friction[:, 5]) == 0.0
+    assert np.ptp(walls[:, 5]) > 0.0
+    assert np.ptp(4.0 * walls[10:, 0]) < 0.6  # it stays near the beginning
 
 
 def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_where_it_is_stuck(env: APOInsert) -> None:
