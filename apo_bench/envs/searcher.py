@@ -3,8 +3,13 @@
 Where contact stops the part, the tip moves in steps along a growing ellipse whose axes are proportional to the stated
 standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
 steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
-and the part can drop. Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part
-is soon stopped again, that was no hole: it is drawn back, and the search goes on.
+and the part can drop. Where walls hold the part in place, the search begins again with another turn about the axis.
+Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part is soon stopped again,
+that was no hole: it is drawn back, and the search goes on.
+
+Where a hole holds the part already, side forces are those of this hole, and of its part, which moves along: they say
+nothing of the next hole. There the search is a circle, and each step makes up for what the tip yielded, until the part
+dips in.
 """
 
 import math
@@ -34,6 +39,7 @@ _PITCH_MM = 0.35  # between turns
 _TURNS = 1.5  # turns, in pitches of the smaller half axis,
 _LEAST_TURNS = 2  # but at least these
 _STEP_MM = 0.35  # along the ellipse
+_LONGEST_MM = 0.5  # greatest step where a hole holds the part
 _YAWS = (0.0, 1.0, -1.0, 2.0, -2.0)  # turns about the axis, one for each search, in stated standard deviations
 _REST = 1  # actions after each step
 _CALM = 25  # actions without resistance for which the approach goes on alone
@@ -42,6 +48,10 @@ _FRICTION = 0.8  # side force that friction explains, as a share of the push,
 _MARGIN_N = 0.5  # and on top of this share: beyond both, walls hold the part
 _YIELD_MM_N = 0.6  # displacement of the tip by a side force with each action
 _YIELD_MM = 0.2  # greatest displacement of an action
+_HOLES = 2.0  # error relative to the next hole, where one holds the part, in those relative to the mean of both
+_DIP_MM = 0.05  # depth beyond a stop from which the part dips into the next hole
+_LIFT_N = 0.3  # side force of what is lifted or drawn along
+_WALL_N = 1.5  # side force on top of friction at which walls hold the part in place
 _NOISE_N = 0.02  # side force that is noise
 _RUB_N = 0.06  # side force above which the part waits
 _FREE_MM = 1.5  # progress of an action in free air
@@ -67,13 +77,18 @@ class Searcher:
         self._waited = 0  # actions since then
         self._stopped = math.inf  # distance left where contact stopped the part, [mm]
         self._press = 0.0  # push at that moment, [N]
+        self._tip = np.zeros(2)  # of the front of the part, by the encoders, [mm]
+        self._first = np.zeros(2)  # where the search began, [mm]
         self._middle = np.zeros(2)  # of the ellipse, [mm]
+        self._aim = np.zeros(2)  # on the ellipse, [mm]
+        self._held = False  # whether a hole holds the part
         self._angle = 0.0  # along the ellipse, [rad]
         self._searches = 0  # that are over
         self._calm = 0  # actions without resistance
         self._rested = 0  # actions since the last step
 
     def __call__(self, observation: Mapping[str, Any]) -> Array:
+        self._tip = np.asarray(observation["agent_pos"][:2], np.float64)
         self._read(np.asarray(observation["wrench"], np.float64), float(observation["plan"][3]))
         ahead = self._phase(np.asarray(observation["plan"][6:12], np.float64))
         return aim_at(self._env, self._target, ahead)
@@ -109,7 +124,8 @@ class Searcher:
                 self._step(deviations)
             return -1.0
         if abs(deeper) > _AGAIN_MM:
-            self._middle = self._target[:2].copy()
+            self._held = _HOLE_MM < deeper < math.inf
+            self._first = self._middle = self._aim = self._tip
             self._angle = 0.0
             self._searches = 0
         self._phase = self._search
@@ -130,27 +146,57 @@ class Searcher:
             self._phase = self._advance
             self._best, self._waited = self._left, 0
             return 0.0
-        self._middle += self._yielded(_FRICTION * max(self._push, 0.0) + _MARGIN_N)
-        self._calm = self._calm + 1 if self._push < self._press / 4 else 0
+        if self._is_told:
+            self._middle = self._middle + self._yielded(self._friction + _MARGIN_N)
+        lifts = not self._is_told and math.hypot(*self._side) > _LIFT_N
+        self._calm = self._calm + 1 if self._push < self._press / 4 and not lifts else 0
         self._rested += 1
         if self._rested > _REST and not 0 < self._calm < _CALM:
             self._rested = 0
+            if not self._held and math.hypot(*self._side) > self._friction + _WALL_N:
+                self._begin_turned()
             self._step(deviations)
         return 0.0
 
+    @property
+    def _is_told(self) -> bool:
+        """Whether side forces are those of the hole that is searched."""
+        return not self._held or self._left < self._stopped - _DIP_MM
+
+    @property
+    def _friction(self) -> float:
+        """Greatest side force that friction explains, [N]."""
+        return _FRICTION * max(self._push, 0.0)
+
+    def _begin_turned(self) -> None:
+        """Search again from the beginning with another turn, since walls hold the part, which does not go in."""
+        self._middle = self._first
+        self._begin_ellipse()
+
+    def _begin_ellipse(self) -> None:
+        """Begin the next ellipse: a larger one, to the other side and with another turn."""
+        self._searches += 1
+        self._angle = 0.0
+
     def _step(self, deviations: Array) -> None:
-        """Move on along the ellipse; begin the next, larger one at its end, to the other side and with another turn."""
-        axes = np.clip(_SIGMAS * deviations[:2] - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
+        """Move on along the ellipse; begin the next one at its end."""
+        sigmas = np.full(2, _HOLES * deviations[:2].min()) if self._held else deviations[:2]
+        axes = np.clip(_SIGMAS * sigmas - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
         turns = max(math.ceil(_TURNS * float(axes.min()) / _PITCH_MM), _LEAST_TURNS)
         whole = 2 * math.pi * turns
         if self._angle > whole:
-            self._searches += 1
-            self._angle = 0.0
+            self._begin_ellipse()
         along = math.hypot(axes[0] * math.sin(self._angle), axes[1] * math.cos(self._angle))  # for each radian
         share = self._angle / whole  # of the largest ellipse
         self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
         aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
-        self._target[:2] = self._middle + self._angle / whole * aside
+        aim = self._middle + self._angle / whole * aside
+        if self._is_told:
+            self._target[:2] += aim - self._aim
+        elif math.hypot(*self._side) < self._friction + _WALL_N:
+            ahead = aim - self._tip
+            self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), _LONGEST_MM))
+        self._aim = aim
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
 
     def _yielded(self, beyond: float) -> Array:

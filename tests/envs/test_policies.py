@@ -44,12 +44,19 @@ def env() -> APOInsert:
     return made
 
 
-def observe(left: float, push: float, side: tuple[float, float] = (0.0, 0.0), deviations: Any = (0.3, 0.8)) -> Any:
-    """An observation with a distance left [mm], a push back and a side force [N], and lateral deviations [mm]."""
+def observe(
+    left: float,
+    push: float,
+    side: tuple[float, float] = (0.0, 0.0),
+    deviations: tuple[float, float] = (0.3, 0.8),
+    tip: Any = (0.0, 0.0),
+) -> Any:
+    """An observation: distance left [mm], push back and side force [N], lateral deviations and position [mm]."""
     plan = np.zeros(19)
     plan[3] = left
     plan[6:8] = deviations
-    return {"agent_pos": np.zeros(13), "wrench": np.array([*side, -push, 0, 0, 0]), "plan": plan}
+    plan[11] = 1.0
+    return {"agent_pos": np.array([*tip, *np.zeros(11)]), "wrench": np.array([*side, -push, 0, 0, 0]), "plan": plan}
 
 
 def stop(policy: Any, actions: int, **felt: Any) -> np.ndarray:
@@ -78,9 +85,16 @@ def test_the_searcher_moves_only_against_resistance_and_rests_after_each_step(en
 
 
 def test_the_searcher_follows_walls_that_hold_the_part_and_no_friction(env: APOInsert) -> None:
-    for side, follows in ((0.8, False), (3.0, True)):
+    for side, follows in ((0.8, False), (1.8, True)):
         ends = 4.0 * stop(Searcher(env), 60, deviations=(0.1, 0.1), side=(side, 0.0))[:, 0]
         assert (ends[-1] - ends[4] > 0.5) == follows
+
+
+def test_the_searcher_begins_again_with_another_turn_where_walls_hold_the_part_in_place(env: APOInsert) -> None:
+    friction, walls = (stop(Searcher(env), 30, side=(side, 0.0)) for side in (1.8, 4.0))
+    assert np.ptp(friction[:, 5]) == 0.0
+    assert np.ptp(walls[:, 5]) > 0.0
+    assert np.ptp(4.0 * walls[10:, 0]) < 0.6  # it stays near the beginning
 
 
 def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_where_it_is_stuck(env: APOInsert) -> None:
@@ -92,6 +106,32 @@ def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_where_it_is_st
     assert rubbed[-1][0] > rubbed[0][0]
     stuck = np.array([searcher(observe(40.0, 1.0)) for _ in range(120)])
     assert np.ptp(stuck[40:, 1]) > 0.1
+
+
+def stop_beyond_a_hole(policy: Any, actions: int, slip: float, left: float = 20.0, **felt: Any) -> np.ndarray:
+    """The positions of a tip that yields by `slip` [mm] with each action, after a second stop 20 mm before the end."""
+    stop(policy, 10)
+    tips = [np.zeros(2)]
+    for k in range(20):
+        policy(observe(48.0 - 1.4 * k, 0.0))
+    for _ in range(4):
+        policy(observe(20.0, 1.0))
+    for k in range(actions):
+        tips.append(4.0 * policy(observe(left, 1.0, tip=tips[-1], **felt))[:2] - (slip * k, 0.0))
+    return np.array(tips[1:])
+
+
+def test_beyond_a_hole_the_searcher_goes_in_circles_and_makes_up_for_what_the_tip_yields(env: APOInsert) -> None:
+    for slip in (0.0, 0.02):
+        tips = stop_beyond_a_hole(Searcher(env), 200, slip)
+        assert np.ptp(tips, axis=0) == pytest.approx([3.0, 3.0], abs=0.6)  # twice the smaller deviation, three times
+        assert np.abs(tips.mean(axis=0)).max() < 0.3
+
+
+def test_beyond_a_hole_the_searcher_follows_side_forces_only_where_the_part_dips_in(env: APOInsert) -> None:
+    for left, follows in ((20.0, False), (19.8, True)):
+        tips = stop_beyond_a_hole(Searcher(env), 60, 0.0, left, deviations=(0.05, 0.05), side=(3.0, 0.0))
+        assert (tips[-1, 0] > 0.5) == follows
 
 
 def test_the_spiral_covers_its_radius_and_goes_on_with_a_turn(env: APOInsert) -> None:
