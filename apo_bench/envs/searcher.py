@@ -3,9 +3,10 @@
 Where contact stops the part, the tip moves in steps along a growing ellipse whose axes are proportional to the stated
 standard deviations of the part relative to the hole, less the play; across an axis that is known, it is a sweep. It
 steps only while the part is pushed back, and rests after each step, so that the friction of parts that move along fades
-and the part can drop. Where walls hold the part in place, the search begins again with another turn about the axis.
-Everywhere else it yields to the side force until walls do not rub, and goes in. Where the part is soon stopped again,
-that was no hole: it is drawn back, and the search goes on.
+and the part can drop. Where walls hold the part in place, the search begins again with another turn about the axis;
+where the part has dipped in a little, a narrower one begins there. Everywhere else it yields to the side force until
+walls do not rub, and goes in. Where the part is soon stopped again, that was no hole: it is drawn back, and the search
+goes on.
 
 Where a hole holds the part already, side forces are those of this hole, and of its part, which moves along: they say
 nothing of the next hole. There the search is a circle, and each step makes up for what the tip yielded, until the part
@@ -24,7 +25,7 @@ from apo_bench.geometry import Array
 
 _FILTER = 0.4  # weight of the newest side force
 _PROGRESS_MM = 0.05  # least progress of an action that is not stopped
-_STALLED = 4  # actions without progress after which contact has stopped the part
+_STALLED = 4  # actions without progress after which a contact ahead has stopped the part
 _NEAR_MM = 1.0  # distance left below which a stop is no reason to search
 _AGAIN_MM = 1.0  # distance from the last stop within which the last search goes on
 _HOLE_MM = 10.0  # least depth of a hole beyond the last stop
@@ -34,7 +35,10 @@ _SKIPPED = 3  # and so many steps away
 _SIGMAS = 3.0  # half axes of the first ellipse, in stated standard deviations,
 _PLAY_MM = 0.3  # less this: a smaller error needs no search
 _MOST_MM = 3.0  # greatest half axis of the first ellipse
-_WIDER = 0.4  # growth of the half axes with each further search
+_WIDER = 0.4  # growth of the half axes after each round of turns
+_TURNED = 0.5  # half axes of an ellipse with a turn, in those without
+_DIPPED_MM = 0.3  # depth beyond the last stop from which the part is near its place: from there on,
+_NARROW_MM = 0.5  # this is the half axis of the first ellipse
 _PITCH_MM = 0.35  # between turns
 _TURNS = 1.5  # turns, in pitches of the smaller half axis,
 _LEAST_TURNS = 2  # but at least these
@@ -82,6 +86,7 @@ class Searcher:
         self._middle = np.zeros(2)  # of the ellipse, [mm]
         self._aim = np.zeros(2)  # on the ellipse, [mm]
         self._held = False  # whether a hole holds the part
+        self._dipped = False  # whether the part was deeper at its last stop than at the one before
         self._angle = 0.0  # along the ellipse, [rad]
         self._searches = 0  # that are over
         self._calm = 0  # actions without resistance
@@ -105,7 +110,7 @@ class Searcher:
 
     def _advance(self, deviations: Array) -> float:
         """Yield to the side force and go on while walls do not rub, until contact stops the part."""
-        if self._waited >= _STALLED and self._left > _NEAR_MM:
+        if self._waited >= (_STALLED if self._push > _PUSHED_N else _CALM) and self._left > _NEAR_MM:
             return self._begin_search(deviations)
         if self._gained > _FREE_MM:
             return 0.0
@@ -128,6 +133,11 @@ class Searcher:
             self._first = self._middle = self._aim = self._tip
             self._angle = 0.0
             self._searches = 0
+            self._dipped = False
+        elif deeper > _DIPPED_MM:
+            self._dipped = True
+            self._first = self._middle = self._aim = self._tip
+            self._begin_ellipse()
         self._phase = self._search
         self._stopped = self._left
         self._press = max(self._push, 0.1)
@@ -146,9 +156,9 @@ class Searcher:
             self._phase = self._advance
             self._best, self._waited = self._left, 0
             return 0.0
-        if self._is_told:
+        if self._follows_force:
             self._middle = self._middle + self._yielded(self._friction + _MARGIN_N)
-        lifts = not self._is_told and math.hypot(*self._side) > _LIFT_N
+        lifts = not self._follows_force and math.hypot(*self._side) > _LIFT_N
         self._calm = self._calm + 1 if self._push < self._press / 4 and not lifts else 0
         self._rested += 1
         if self._rested > _REST and not 0 < self._calm < _CALM:
@@ -159,7 +169,7 @@ class Searcher:
         return 0.0
 
     @property
-    def _is_told(self) -> bool:
+    def _follows_force(self) -> bool:
         """Whether side forces are those of the hole that is searched."""
         return not self._held or self._left < self._stopped - _DIP_MM
 
@@ -174,14 +184,13 @@ class Searcher:
         self._begin_ellipse()
 
     def _begin_ellipse(self) -> None:
-        """Begin the next ellipse: a larger one, to the other side and with another turn."""
+        """Begin the next ellipse, to the other side and with another turn."""
         self._searches += 1
         self._angle = 0.0
 
     def _step(self, deviations: Array) -> None:
         """Move on along the ellipse; begin the next one at its end."""
-        sigmas = np.full(2, _HOLES * deviations[:2].min()) if self._held else deviations[:2]
-        axes = np.clip(_SIGMAS * sigmas - _PLAY_MM, 0.0, _MOST_MM) * (1.0 + _WIDER * self._searches)
+        axes = self._half_axes(deviations[:2])
         turns = max(math.ceil(_TURNS * float(axes.min()) / _PITCH_MM), _LEAST_TURNS)
         whole = 2 * math.pi * turns
         if self._angle > whole:
@@ -191,13 +200,22 @@ class Searcher:
         self._angle += _STEP_MM / max(share * max(along, float(axes.max()) / 2), _PITCH_MM)
         aside = axes * (math.cos(self._angle), math.sin(self._angle)) * (-1) ** self._searches
         aim = self._middle + self._angle / whole * aside
-        if self._is_told:
+        if self._follows_force:
             self._target[:2] += aim - self._aim
         elif math.hypot(*self._side) < self._friction + _WALL_N:
             ahead = aim - self._tip
             self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), _LONGEST_MM))
         self._aim = aim
         self._target[5] = _YAWS[self._searches % len(_YAWS)] * deviations[5]
+
+    def _half_axes(self, deviations: Array) -> Array:
+        """Return the half axes of the present ellipse, (2,), [mm]."""
+        rounds, turned = divmod(self._searches, len(_YAWS))
+        wider = 1.0 + _WIDER * rounds
+        if self._dipped:
+            return np.full(2, _NARROW_MM * wider)
+        sigmas = np.full(2, _HOLES * deviations.min()) if self._held else deviations
+        return np.clip(_SIGMAS * sigmas - _PLAY_MM, 0.0, _MOST_MM) * wider * (_TURNED if turned else 1.0)
 
     def _yielded(self, beyond: float) -> Array:
         """Return by how much the tip yields to the side force beyond a size, [N]: (2,), [mm]."""

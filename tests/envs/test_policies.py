@@ -97,6 +97,24 @@ def test_the_searcher_begins_again_with_another_turn_where_walls_hold_the_part_i
     assert np.ptp(4.0 * walls[10:, 0]) < 0.6  # it stays near the beginning
 
 
+def test_where_the_part_dipped_in_the_searcher_searches_close_by_with_another_turn(env: APOInsert) -> None:
+    searcher = Searcher(env)
+    before = 4.0 * stop(searcher, 60, deviations=(0.8, 0.8))[-1, :2]
+    for _ in range(6):
+        searcher(observe(49.4, 1.0, deviations=(0.8, 0.8), tip=before))
+    actions = np.array([searcher(observe(49.4, 1.0, deviations=(0.8, 0.8), tip=before)) for _ in range(20)])
+    assert np.abs(4.0 * actions[:, :2] - before).max() < 0.8
+    assert actions[:, 5].any()
+
+
+def test_the_searcher_is_stopped_by_a_contact_ahead_only(env: APOInsert) -> None:
+    for push, searches in ((0.0, False), (1.0, True)):
+        searcher = Searcher(env)
+        searcher(observe(60.0, 0.0))
+        moved = np.array([searcher(observe(50.0, push)) for _ in range(40)])
+        assert moved.any() == searches
+
+
 def test_the_searcher_goes_in_while_walls_do_not_rub_and_searches_where_it_is_stuck(env: APOInsert) -> None:
     searcher = Searcher(env)
     stop(searcher, 10)
