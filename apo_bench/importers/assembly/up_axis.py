@@ -1,6 +1,6 @@
 """Choose the up axis and the base part of an assembly: as stated, or the first choice that works."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -62,7 +62,7 @@ def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenar
         except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
-        if not any(_list_hindrances(found[axis])):  # no other axis is better
+        if not any(_list_hindrances(found[axis])[: 2 if axis == "z" else None]):  # z may need fixtures
             break
     if not found:
         raise next(iter(failed.values()))  # that of the first axis
@@ -73,10 +73,11 @@ def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenar
     return replace(found[best], up=f"{best}, as with z up {why}")
 
 
-def _list_hindrances(scenario: NewScenario) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the notes on parts that cannot be grasped, and those on parts that do not come from above."""
+def _list_hindrances(scenario: NewScenario) -> tuple[Collection[str], ...]:
+    """Return the notes on parts that cannot be grasped, those on parts that do not come from above, and the parts that
+    start in a fixture."""
     aside = [f"'{placing.moves[0]}' {placing.why}" for placing in scenario.order if "from above" not in placing.why]
-    return scenario.unfit, aside
+    return scenario.unfit, aside, scenario.fixtures
 
 
 def _try_bases(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenario:
