@@ -1,6 +1,6 @@
 """Find a grasp from above for each part of a new scenario, with the collision checks of the robot's planner."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -99,17 +99,20 @@ class GoalRoom:
         self._solids = solids
         self._poses = poses
         self._kinematics = find_kinematics()
-        self._known: dict[tuple[str, tuple[str, ...]], bool] = {}
+        self._known = defaultdict[str, dict[frozenset[str], bool]](dict)
 
     def has_room(self, part: str, there: Sequence[str]) -> bool:
         """Whether some grasp of a part from above is clear of the parts that are there."""
-        key = (part, tuple(there))
-        if key not in self._known:
-            goal = _list_resting_parts(self._solids, part, {name: self._poses[name] for name in there}, (part,))
-            places = _list_holds_from_above(self._solids[part], goal.T, self._kinematics.arm.opening_m)
-            clear = (find_clear_grasp(self._kinematics, self._solids[part], each, (goal,)) for each in places)
-            self._known[key] = any(grasp is not None for grasp in clear)
-        return self._known[key]
+        among = frozenset(there)
+        for others, room in self._known[part].items():
+            if (among <= others) if room else (among >= others):
+                return room  # what has room among more parts has it among fewer
+        goal = _list_resting_parts(self._solids, part, {name: self._poses[name] for name in there}, (part,))
+        places = _list_holds_from_above(self._solids[part], goal.T, self._kinematics.arm.opening_m)
+        clear = (find_clear_grasp(self._kinematics, self._solids[part], each, (goal,)) for each in places)
+        room = any(grasp is not None for grasp in clear)
+        self._known[part][among] = room
+        return room
 
 
 def _list_resting_parts(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:

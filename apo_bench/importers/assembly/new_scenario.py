@@ -100,6 +100,8 @@ def new_scenario(
         raise RuntimeError("; ".join(clashes) + ".")
     poses, contacts, dropped = close_contacts(solids, poses, find_contacts(solids, poses), (TABLE, *base))
     apart = set(find_contacts(solids, poses, _PLAY_M)) - {*contacts, *dropped}
+    walls = find_walls_without_play(solids, poses, sorted(apart))
+    loose = {frozenset(of.part for of in pair[0]): pair for pair in walls}
     notes = [
         *(f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped),
         *(
@@ -107,9 +109,9 @@ def new_scenario(
             for contact, opposite in find_walls_without_play(solids, poses, contacts)
         ),
         *(
-            f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing; draw them "
-            "line to line, and the added clearance gives them play"
-            for contact, opposite in find_walls_without_play(solids, poses, sorted(apart))
+            f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing, like other "
+            "walls of these two parts; draw them line to line, and the added clearance gives them play"
+            for contact, opposite in loose.values()
         ),
     ]
     reach = find_reach(solids, poses, [each.name for each in parts])

@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, ContactMeasurements, Operation, Poses
-from apo_bench.geometry import Array, Solid, measure_drop, measure_extent, pose
+from apo_bench.geometry import Array, PosedPieces, Solid, is_path_free, measure_extent, pose
 from apo_bench.importers.assembly.contact_search import find_contacts
 from apo_bench.importers.assembly.posed_parts import TABLE
 from apo_bench.importers.assembly.staging import find_stance
@@ -22,16 +22,18 @@ from apo_bench.planning.insertion.attach_line import Preference
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.planning.prediction.stability import BALANCED, measure_imbalance
 
-_FALLS_M = 7e-4
-"""Largest drop of a part that still counts as carried: a part in a hole drops by its play."""
+_FALLS_M = 7.5e-4
+"""A part is carried if another one stops it on this way down: a part in a hole drops by its play."""
 _CARRIES = 1e-3
 """A contact carries weight if the vertical component of its normal is at least this."""
 _SAME = 1e-6  # directions whose cosine differs from 1 by less are equal
 _SEAT = 0.5
 """A face ends an insertion if the cosine of its normal with the opposite of the direction is at least this."""
-_MOST_SETS = 4000
+_MOST_SETS = 30
 """The search ends after this number of sets of parts without an order."""
 _LARGEST_GROUP = 4  # parts in a sub-assembly
+_CARRIED = 3
+"""Tests that a part has passed which stays at its place, whether or not it can leave."""
 
 
 class RemovalObstacle(NamedTuple):
@@ -119,12 +121,19 @@ class OrderSearch:
         """
         free = [part for part in self.solids if part in there - base]
         single = []
+        falling = []
         for part in free:
             found = self._plan_removal((part,), there)
             if isinstance(found, Placement):
                 single.append(found)
-            elif found.passed >= self.obstacles.get(part, found).passed:
+                continue
+            if found.passed >= self.obstacles.get(part, found).passed:
                 self.obstacles[part] = found
+            if found.passed < _CARRIED and (part not in self.held or not found.passed):
+                falling.append(part)
+        if falling:  # what falls among these parts falls among fewer, too
+            self._note_stuck(falling)
+            return
         if single:
             yield from sorted(single, key=lambda placing: self._removal_priority(placing, there))
             return
@@ -133,9 +142,13 @@ class OrderSearch:
             placing = self._plan_removal(group, there) if self._is_connected(group) else None
             if isinstance(placing, Placement) and self._can_preassemble(group) is not None:
                 yield placing
-        # Reached if no group led to an order either: remember the smallest stuck set for the error message.
-        if not self.left or len(free) < len(self.left):
-            self.left = frozenset(free)
+        # Reached if no group led to an order either.
+        self._note_stuck(free)
+
+    def _note_stuck(self, parts: Sequence[str]) -> None:
+        """Remember the smallest stuck set for the error message."""
+        if not self.left or len(parts) < len(self.left):
+            self.left = frozenset(parts)
 
     def _removal_priority(self, placing: Placement, there: frozenset[str]) -> tuple[float, ...]:
         """Return the sort key of a removal; the smallest is removed first, thus assembled last.
@@ -202,8 +215,8 @@ class OrderSearch:
         """
         main = moves[0]
         poses = self.poses
-        drops = (measure_drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
-        if min(drops) > _FALLS_M:
+        above, below = ([PosedPieces(self.solids[part].pieces, poses[part]) for part in of] for of in (moves, rest))
+        if is_path_free(above, -UP, _FALLS_M, below):
             return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
         operation = Operation(main, contacts, tuple(moves[1:]))
         if measure_imbalance(ContactMeasurements(assembly), operation, poses) <= BALANCED:

@@ -2,20 +2,33 @@
 
 Faces recede as a whole (`added_clearance`). What overlaps beyond them, such as the lip of a snap fit or a rounded edge,
 is cut off at the plane across which the two pieces overlap least, and by the clearance behind it. If no straight way
-out is free, what is in the way on the freest one is cut off too.
+out is free, what is in the way on the freest one is cut off too. So is what touches next to receded faces and would
+leave them no play.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import manifold3d
 import numpy as np
 
-from apo_bench.geometry import Array, Hull, Piece, measure_intrusion, measure_world_bounds, pose
-from apo_bench.importers.assembly.added_clearance import add_clearance, limit_depth
+from apo_bench.assembly.facing_pairs import find_facing_pairs
+from apo_bench.geometry import (
+    Array,
+    Face,
+    Hull,
+    Piece,
+    RoundFace,
+    measure_intrusion,
+    measure_world_bounds,
+    pose,
+    shrink_pieces,
+)
+from apo_bench.importers.assembly.added_clearance import TightPair, add_clearance, limit_depth
+from apo_bench.importers.assembly.contact_search import NEAR_M, NEAR_RAD, SHARE
 from apo_bench.importers.assembly.misplaced import find_least_overlap, measure_depth
 from apo_bench.importers.assembly.posed_parts import PosedPart
 from apo_bench.importers.cad.pieces.corners import is_thick, list_body_corners, list_hull_corners
@@ -26,6 +39,8 @@ _LARGEST_LOSS = 0.02
 _STEP_M = 1e-3  # between places along a way
 _WAY_FACTOR = 1.5
 """Overlaps on the way may be deeper than those as drawn by this factor, since lips of snap fits are."""
+_STOPS = 0.02
+"""A seat stops a shift if the cosine of its normal with the opposite of the shift is at least this."""
 _NO_FLATS = np.zeros((0, 4))
 
 
@@ -36,6 +51,10 @@ class ShavedPieces(NamedTuple):
     """Part file -> all of its pieces; only parts that were cut."""
     lines: tuple[str, ...]
     """One sentence for each pair: depth as drawn, volume taken off, and the play that results."""
+
+
+_Place = tuple[PosedPart, PosedPart, float]
+"""Two parts, the second one at a place, and the gap that cuts are to leave there, [mm]."""
 
 
 class _Cut(NamedTuple):
@@ -55,26 +74,32 @@ def shave_overlaps(parts: Sequence[PosedPart], clearance_mm: float, most_mm: flo
         clearance_mm: Gap that the cuts leave.
         most_mm: Parts with a deeper overlap stay as drawn.
     """
-    receded, _, _ = add_clearance(parts, clearance_mm, most_mm)
+    receded, tight, _ = add_clearance(parts, clearance_mm, most_mm)
     pieces: dict[Path, list[Piece]] = {each.file: list(each.solid.pieces) for each in parts}
     cut = set[Path]()
     lines = list[str]()
     for a, b in combinations(receded, 2):
         most_m = 1e-3 * limit_depth((a, b), most_mm)
         places, depth_m = _list_tight_places(a, b, most_m)
+        cuts = [(a, place, clearance_mm) for place in places]
+        if depth_m <= most_m:
+            own, other = (_shrink(each, 1e-3 * clearance_mm) for each in (a, b))
+            shifts = _list_play_shifts(a, b, tight, 1e-3 * clearance_mm)
+            cuts += [(own, replace(other, T=pose.at(shift) @ b.T), 0.0) for shift in shifts]
         lost = {a.name: 0.0, b.name: 0.0}
         allowed = {each.name: 1e9 * _LARGEST_LOSS * each.solid.volume for each in (a, b)}
-        for p, q, moved in _list_deep_pieces(a, places):
-            least = min(_cut_apart(a, p, moved, q, pieces, clearance_mm), key=lambda each: each.lost_mm3)
+        for p, q, (own, place, gap_mm) in _list_deep_pieces(cuts):
+            least = min(_cut_apart(own, p, place, q, pieces, gap_mm), key=lambda each: each.lost_mm3)
             if lost[least.of.name] + least.lost_mm3 > allowed[least.of.name]:
                 continue
             lost[least.of.name] += least.lost_mm3
             pieces[least.of.file][least.number] = least.piece
             cut.add(least.of.file)
         where = "as drawn" if len(places) < 2 else "as drawn or on the way to their places"
+        are = f"are {1e3 * depth_m:.2g} mm inside each other {where}" if places else "touch as drawn"
         lines += [
-            f"'{a.name}' and '{b.name}' are {1e3 * depth_m:.2g} mm inside each other {where}, where no whole face "
-            f"explains it: {volume:.3g} mm^3 of '{name}' are taken off, which leaves {clearance_mm:g} mm of play"
+            f"'{a.name}' and '{b.name}' {are}, where no whole face explains it: {volume:.3g} mm^3 of '{name}' are "
+            f"taken off, which leaves {clearance_mm:g} mm of play"
             for name, volume in lost.items()
             if volume > 0.0
         ]
@@ -119,11 +144,42 @@ def _move_along(a: PosedPart, b: PosedPart, way: Array) -> Iterator[PosedPart]:
         yield replace(b, T=pose.at(step * way) @ b.T)
 
 
-def _list_deep_pieces(a: PosedPart, places: Sequence[PosedPart]) -> Iterator[tuple[Piece, Piece, PosedPart]]:
-    """Yield the pairs of pieces of two parts that are inside each other, and the second part at that place."""
-    for p, b in product(a.solid.pieces, places):
-        if measure_depth(a.T, (p,), b.T, b.solid.pieces) > DEEP_M:
-            yield from ((p, q, b) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
+def _shrink(part: PosedPart, clearance_m: float) -> PosedPart:
+    """Return a part with its fit faces receded by the clearance."""
+    return replace(part, solid=replace(part.solid, pieces=shrink_pieces(part.solid, clearance_m)))
+
+
+def _list_play_shifts(a: PosedPart, b: PosedPart, tight: Sequence[TightPair], clearance_m: float) -> list[Array]:
+    """Return the shifts of part b, (3,), for which receded faces give it room against part a, [m]."""
+    ways = list[Array]()
+    for pair in tight:
+        if {pair.part, pair.other} == {a.name, b.name}:
+            own, sign = (a, -1.0) if pair.part == a.name else (b, 1.0)
+            ways += [sign * own.T[:3, :3] @ way for face in pair.faces for way in _list_play_ways(own.solid.face(face))]
+    pairs = [
+        (a.solid.face(each.a), b.solid.face(each.b))
+        for each in find_facing_pairs(a.solid, a.T, b.solid, b.T, gap_m=NEAR_M, angle_rad=NEAR_RAD, share=SHARE)
+    ]
+    seats = [mine for mine, its in pairs if not (mine.fit or its.fit)]
+    if not all(isinstance(face, Face) for face in seats):
+        return []  # a shaft with the play that was drawn
+    stops = [a.T[:3, :3] @ face.normal for face in seats if isinstance(face, Face)]
+    free = [way for way in ways if all(way @ stop > -_STOPS for stop in stops)]
+    return [clearance_m * way for way in np.unique(np.round(free, 9).reshape(-1, 3), axis=0)]
+
+
+def _list_play_ways(face: Face | RoundFace) -> list[Array]:
+    """Return the directions from a receded face in which its part has play, (3,) each, frame of the part."""
+    return [face.normal] if isinstance(face, Face) else [s * face.frame[:3, k] for k in (0, 1) for s in (-1.0, 1.0)]
+
+
+def _list_deep_pieces(cuts: Sequence[_Place]) -> Iterator[tuple[Piece, Piece, _Place]]:
+    """Yield the pairs of pieces of two parts that are inside each other, and where they are."""
+    for cut in cuts:
+        a, b, _ = cut
+        for p in a.solid.pieces:
+            if measure_depth(a.T, (p,), b.T, b.solid.pieces) > DEEP_M:
+                yield from ((p, q, cut) for q in b.solid.pieces if measure_depth(a.T, (p,), b.T, (q,)) > DEEP_M)
 
 
 def _cut_apart(

@@ -1,6 +1,6 @@
 """Choose the up axis and the base part of an assembly: as stated, or the first choice that works."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -51,7 +51,8 @@ def _try_fastened(parts: Sequence[PosedPart], choices: AssemblyChoices) -> tuple
 
 
 def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenario:
-    """Make the scenario with the stated axis up, or with z or the axis with the fewest parts that cannot be grasped."""
+    """Make the scenario with the stated axis up, or with z or an axis for which more parts can be grasped, or come from
+    above."""
     up = choices.up
     found: dict[str, NewScenario] = {}
     failed: dict[str, NoAssemblyOrder | InputError] = {}
@@ -61,15 +62,22 @@ def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenar
         except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
-        if not found[axis].unfit:  # all parts can be grasped, so no other axis is tried
+        if not any(_list_hindrances(found[axis])[: 2 if axis == "z" else None]):  # z may need fixtures
             break
     if not found:
         raise next(iter(failed.values()))  # that of the first axis
-    best = min(found, key=lambda axis: len(found[axis].unfit))
+    best = min(found, key=lambda axis: [len(each) for each in _list_hindrances(found[axis])])
     if up or best == "z":
         return replace(found[best], up=f"{best}, as asked" if up else best)
-    why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(found["z"].unfit)
+    why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(next(filter(None, _list_hindrances(found["z"]))))
     return replace(found[best], up=f"{best}, as with z up {why}")
+
+
+def _list_hindrances(scenario: NewScenario) -> tuple[Collection[str], ...]:
+    """Return the notes on parts that cannot be grasped, those on parts that do not come from above, and the parts that
+    start in a fixture."""
+    aside = [f"'{placing.moves[0]}' {placing.why}" for placing in scenario.order if "from above" not in placing.why]
+    return scenario.unfit, aside, scenario.fixtures
 
 
 def _try_bases(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenario:

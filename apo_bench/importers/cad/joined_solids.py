@@ -46,8 +46,9 @@ def _join(raws: Sequence[RawSolid]) -> RawSolid:
         return raws[0]
     bodies = [convert_to_manifold(raw.mesh) for raw in raws]
     mesh = simplify_body(convert_to_mesh(manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)))
-    repairs = (*(repair for raw in raws for repair in raw.repairs), f"{len(raws)} solids next to each other are joined")
-    return RawSolid(raws[0].name, mesh, raws[0].places, repairs)
+    repairs = dict.fromkeys(repair for raw in raws for repair in raw.repairs)
+    joined = f"{len(raws)} solids next to each other are joined"
+    return RawSolid(raws[0].name, mesh, raws[0].places, (*repairs, joined))
 
 
 def split_solid(raw: RawSolid) -> list[RawSolid]:

@@ -1,6 +1,5 @@
 """Import the solids of a CAD file as part files: convex pieces, and faces that can make contacts."""
 
-import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +29,7 @@ from apo_bench.importers.cad.solids import (
 )
 from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.face_checks import check_faces, find_supported_area
+from apo_bench.scenario.parts.face_checks import FaceError, check_faces, find_supported_area
 from apo_bench.scenario.parts.limits import DENSITY, HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.scenario.parts.making import Body, build_solid, write_part
 from apo_bench.scenario.parts.making.moments import Moments
@@ -42,8 +41,6 @@ _NEARLY_ALL = 0.98
 """The share of a flat face that must lie on pieces otherwise."""
 _SLIVERS = 0.01
 """Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
-_FACE_AT_FAULT = re.compile(r", faces, (\w+):")
-"""The face in the message of a part file that cannot be read."""
 # Why a filled hole can make no contact.
 _FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
@@ -145,7 +142,7 @@ def import_solid(
         try:
             path, solid = _write_checked(name, replace(body, moments=moments), folder, stated, refused)
             break
-        except _FaultyPart as error:
+        except InputError as error:
             fault = error
     else:  # no moments gave a part that could be read
         raise InputError(
@@ -153,10 +150,6 @@ def import_solid(
         ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
-
-
-class _FaultyPart(Exception):
-    """A written part whose shape for collisions does not agree with the solid."""
 
 
 def _write_checked(
@@ -169,8 +162,7 @@ def _write_checked(
         refused: Gets the omitted faces with the reason.
 
     Raises:
-        InputError: The part cannot be written.
-        _FaultyPart: It cannot be read back.
+        InputError: The part cannot be read back, as its shape for collisions does not agree with the solid.
     """
     while True:
         path = write_part(name, body, folder, **stated)
@@ -179,11 +171,10 @@ def _write_checked(
         except InputError as error:
             path.unlink()
             path.with_suffix(".toml").unlink(missing_ok=True)
-            face = _FACE_AT_FAULT.search(str(error))
-            if face is None or face[1] in refused:
-                raise _FaultyPart from error
-            refused[face[1]] = str(error).split(": ", 1)[-1].split("; ")[0]
-            body = _remove_faces(body, {face[1]})
+            if not isinstance(error, FaceError):
+                raise
+            refused[error.face] = error.reason
+            body = _remove_faces(body, {error.face})
 
 
 def _choose_density(source: str, volume: float, density: float) -> tuple[float, tuple[str, ...]]:
@@ -283,8 +274,8 @@ def _describe_fault(solid: Solid, face: Face | RoundFace) -> str:
     flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
     try:
         check_faces(replace(solid, faces=flat, rounds=wall), Path("part"))
-    except InputError as error:
-        return str(error).split(": ", 1)[-1].split("; ")[0]
+    except FaceError as error:
+        return error.reason
     return ""
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, final
 
 import numpy as np
 
@@ -50,10 +50,26 @@ _LEAST_WALL = 0.5
 """Least fraction of a round face that must lie on pieces; bores may cross it."""
 _NEAR = 0.05
 """Depth of the free space in front of a wall in which no piece may be, in radii."""
+_REMEDY = "state the face as the pieces are, or correct the pieces"
+
+
+@final
+class FaceError(InputError):
+    """A stated face does not agree with the pieces of its part."""
+
+    def __init__(self, place: object, face: str, reason: str, remedy: str = _REMEDY) -> None:
+        super().__init__(place, face, reason, remedy)
+        self.face = face
+        self.reason = reason
+        """What is wrong, without place and remedy."""
+
+    def __str__(self) -> str:
+        place, face, reason, remedy = self.args
+        return f"{place}, faces, {face}: {reason}; {remedy}."
 
 
 def check_faces(solid: Solid, path: Path) -> float:
-    """Raise an `InputError` unless every stated face lies on the pieces, with free space in front of it.
+    """Raise a `FaceError` unless every stated face lies on the pieces, with free space in front of it.
 
     Args:
         path: The file, for messages.
@@ -61,9 +77,9 @@ def check_faces(solid: Solid, path: Path) -> float:
     Returns:
         Largest error of the volume from round walls that are approximated by flat sides, [m^3].
     """
-    for name, flat in solid.faces.items():
-        _check_flat(flat, solid.pieces, f"{path}, faces, {name}")
-    return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
+    for flat in solid.faces.values():
+        _check_flat(flat, solid.pieces, path)
+    return sum(_check_round(wall, solid.pieces, path) for wall in solid.rounds.values())
 
 
 def _find_near_pieces(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
@@ -73,8 +89,8 @@ def _find_near_pieces(pieces: tuple[Piece, ...], corners: Array, margin: float) 
     return [p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()]
 
 
-def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
-    """Raise an `InputError` unless sides of pieces lie below all of a flat face, and no piece covers it."""
+def _check_flat(face: Face, pieces: tuple[Piece, ...], place: object) -> None:
+    """Raise a `FaceError` unless sides of pieces lie below all of a flat face, and no piece covers it."""
     import shapely
 
     n = face.normal
@@ -86,16 +102,15 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
     if not bare.is_empty:
         at = bare.representative_point()
         x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)
-        _raise_fault(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+        raise FaceError(place, face.name, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
     commons = [common for area in below if (common := stated.intersection(area)).area >= _BESIDE_M**2]
     within = [[at.x, at.y] for at in (common.representative_point() for common in commons)]
     points = np.array(within).reshape(-1, 2) @ to_plane.T + (n @ face.outline[0] + _ABOVE_M) * n
     depths = np.array([measure_depth_inside(piece, points) for piece in near])
     for k in np.flatnonzero((depths > _ROUNDED_M).any(axis=0)):
         x, y, z = 1e3 * points[k]
-        _raise_fault(
-            place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm"
-        )
+        piece = near[depths[:, k].argmax()]
+        raise FaceError(place, face.name, f"piece '{piece.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
 
 
 def _list_sides_below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
@@ -143,8 +158,8 @@ def _project_side(piece: Piece, side: Array, to_plane: Array) -> Any:
     return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull
 
 
-def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
-    """Raise an `InputError` unless pieces lie at the stated radius of a wall, and nothing is in front of it.
+def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: object) -> float:
+    """Raise a `FaceError` unless pieces lie at the stated radius of a wall, and nothing is in front of it.
 
     Rays from the axis are intersected with the pieces at several heights.
 
@@ -155,7 +170,7 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
     angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if wall.toward is None else 0.5))
     near = _find_near_pieces(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
     if not near:
-        _raise_fault(place, "no piece is near the face")
+        raise FaceError(place, wall.name, "no piece is near the face")
     near_wall = 0
     off = 0.0
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
@@ -172,15 +187,15 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
         if into.any():
             true = np.abs(at[into][0])
             where = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
-            _raise_fault(
-                place, f"pieces have a side {where}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm"
-            )
+            stated = f"{1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm"
+            raise FaceError(place, wall.name, f"pieces have a side {where}, {stated}")
         gap = np.maximum(sign * (at - radius), 0.0)
         near_wall += int((gap <= allowed).sum())
         off = max(off, float(gap[gap <= allowed].max(initial=0.0)))
     if near_wall < _LEAST_WALL * _RAYS * len(heights):
-        _raise_fault(
+        raise FaceError(
             place,
+            wall.name,
             f"pieces lie along {near_wall / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
             f"{_LEAST_WALL:.0%} is needed",
         )
@@ -198,9 +213,12 @@ def check_receding(solid: Solid, path: Path) -> None:
         try:
             _check_round(wider, shrink_pieces(solid, _TRIED_M), "")
         except InputError as error:
-            raise InputError(
-                f"{path}, faces, {wall.name}: the wall is fit, and pieces that touch it in a corner only keep it from "
-                "getting wider by the clearance; cut what is around it into pieces that have sides on it."
+            raise FaceError(
+                path,
+                wall.name,
+                "the wall is fit, and pieces that touch it in a corner only keep it from getting wider by the "
+                "clearance",
+                "cut what is around it into pieces that have sides on it",
             ) from error
 
 
@@ -217,8 +235,3 @@ def _intersect_pieces(pieces: list[Piece], origin: Array, out: Array) -> tuple[A
     enter, leave = np.array([intersect_rays(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
     behind = leave <= 0.0
     return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
-
-
-def _raise_fault(place: str, what: str) -> NoReturn:
-    """Raise an `InputError` with the remedy."""
-    raise InputError(f"{place}: {what}; state the face as the pieces are, or correct the pieces.")

@@ -74,3 +74,14 @@ def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_t
     assert found.fixed == ("core",)
     assert found.why_fixed.startswith("one of the lowest")
     assert [placing.moves for placing in found.order] == [("cup",)]
+
+
+def test_the_side_goes_up_from_which_parts_come_from_above(tmp_path: Path) -> None:
+    """With z up the core would have to be put into the side of the cup."""
+    cup = join(FLOOR, box(10, 50))
+    core = extrude(make_rectangle(30, 30), 0, 70, bottom="foot", top="head")
+    aside = turned(made(tmp_path, cup=(cup, (0, 0, 0)), core=(core, (0, 0, 10))), 90, 0, 0)
+    assert new_upright_scenario(aside, Z_UP).up == "z, as asked"
+    found = new_upright_scenario(aside, AssemblyChoices(fixed=("cup",)))
+    assert found.up.startswith("-y, as with z up 'core' comes along")
+    assert all("from above" in placing.why for placing in found.order)

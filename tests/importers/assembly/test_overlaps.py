@@ -10,7 +10,7 @@ import pytest
 from manifold3d import Manifold
 
 import apo_bench
-from apo_bench.geometry import measure_intrusion, pose
+from apo_bench.geometry import measure_intrusion, pose, shrink_pieces
 from apo_bench.importers.assembly.from_cad import import_parts
 from apo_bench.importers.assembly.misplaced import describe_overlap, list_misplaced
 from apo_bench.importers.assembly.posed_parts import PosedPart, read_posed
@@ -38,6 +38,26 @@ def test_a_bump_inside_a_wall_is_cut_off_with_the_clearance_and_the_scenario_sta
     assert "no whole face explains it" in (tmp_path / "own.toml").read_text(encoding="utf-8")
     with pytest.raises(RuntimeError, match=r"'stand' and 'lug' are 0\.\d+ mm inside each other"):
         apo_bench.import_assembly(files, tmp_path / "other.toml", unit="mm", fits="refuse")
+
+
+SLOT = block(60, 40, 10) + block(20, 40, 40, (-20, 0, 10)) + block(20, 40, 40, (20, 0, 10))
+TONGUE = block(20, 40, 20, (0, 0, 10)) + block(16, 40, 60, (0, 0, 30))
+BEADS = [Manifold.cylinder(40, 3, 3, 24).rotate((90, 0, 0)).translate((x, 20, 40)) for x in (-7, 7)]
+
+
+def test_a_bead_that_leaves_a_tongue_no_play_is_cut_back(tmp_path: Path) -> None:
+    """The beads touch the walls of the slot along a line, which makes no contact that could recede."""
+    solids = {"slot": SLOT, "tongue": TONGUE + BEADS[0] + BEADS[1]}
+    files = [write_stl(solid, tmp_path / f"{name}.stl") for name, solid in solids.items()]
+    scenario = apo_bench.import_assembly(files, tmp_path / "own.toml", unit="mm")
+    assert "touch as drawn, where no whole face explains it" in (tmp_path / "own.toml").read_text(encoding="utf-8")
+    slot, tongue = (scenario.assembly.solids[name] for name in ("slot", "tongue"))
+    assert any(face.fit for face in tongue.faces.values())
+    thin = replace(tongue, pieces=shrink_pieces(tongue, 2.5e-4))
+    goal = pose.inverse(scenario.start["slot"]) @ scenario.nominal_poses[0]
+    for way in (-1.0, 1.0):
+        shifted = pose.at((way * 2.3e-4, 0, 1e-6)) @ goal
+        assert measure_intrusion(slot, np.eye(4), thin, shifted) < 1e-5, "0.25 mm of play, cut to 0.02 mm"
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 import shutil
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from apo_bench import InputError, build_scene, load_scenario
 from apo_bench.resources import folder
 from apo_bench.scenario.parts import find_part_path, list_part_names, load_part, read_part
+from apo_bench.scenario.parts.face_checks import FaceError
 from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft, write_part
 from apo_bench.scenario.parts.mass_checks import check_part
 
@@ -84,6 +86,17 @@ def test_pieces_must_be_convex_and_one(case: str, part: Path) -> None:
     assert count == 1
     part.write_text(text, encoding="utf-8")
     assert words in refusal(part)
+
+
+def test_the_error_of_a_face_names_it_also_after_pickling(part: Path) -> None:
+    stated = part.with_suffix(".toml")
+    stated.write_text(stated.read_text(encoding="utf-8").replace("radius_mm = 3.0\n", "radius_mm = 3.1\n"), "utf-8")
+    with pytest.raises(FaceError) as caught:
+        load_part(part)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert str(again) == str(caught.value)
+    assert (again.face, again.reason) == ("bore", caught.value.reason)
+    assert again.reason.startswith("pieces have a side 3.0")
 
 
 def stl(triangles: np.ndarray) -> bytes:
