@@ -27,11 +27,16 @@ from apo_bench.simulation.robot import RobotError, translate
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.robot_draws import bring, list_unit_errors, place_part, stack_errors, twist_in_open_hand
 
-_DRAGGED = np.array([0.02, 0.04, 0.09, *np.radians([20.0, 440.0, 100.0])])
+_DRAGGED = np.array([0.023, 0.038, 0.085, *np.radians([18.0, 50.0, 105.0])])
 """What a grasp adds to the twist of a part in the hand, (6,), 1 sigma, for each metre that the pads push it, [m/m,
-rad/m]; by generated assemblies (`python -m benchmarks.grasp_error`)."""
+rad/m]; the tilt about the second axis is that of a part of 1 N, since heavy parts tilt less. Measured on generated
+assemblies (`python -m benchmarks.grasp_error`)."""
 _LEAST = np.array([*np.full(3, 1e-5), *np.full(3, np.radians(0.005))])
 """Error of a robot without errors, which its servos leave, (6,), 1 sigma, [m, rad]."""
+_LEVEL = 0.5
+"""A face carries weight if the vertical component of its normal is at least this."""
+_FAR_M = 0.01
+"""Standard deviation of a distance that weight closes in any case, far above all errors."""
 _STEP = 1e-6
 """Step of the derivatives of placements by operations, [m, rad]."""
 
@@ -93,7 +98,8 @@ def _propagate(robot_error: str, plan: Plan, scene: Scene, moves: Sequence[Move]
         first = 1 + len(units) + 12 * k
         before = twist_in_open_hand(scene, move.transfer, error, resting[move.transfer.part])
         pushed = np.linalg.norm((before - before[0])[: 1 + len(units), 0])
-        error.in_hand[k, first : first + 6] = pose.exp(np.diag(pushed * _DRAGGED))
+        dragged = pushed * _DRAGGED / [1.0, 1.0, 1.0, 1.0, move.transfer.weight_n, 1.0]
+        error.in_hand[k, first : first + 6] = pose.exp(np.diag(dragged))
         put = bring(scene, move, error, resting[move.transfer.part])
         now = compute_transferred_poses(plan.assembly.operations[k], put, resting)
         if move is moves[-1]:
@@ -115,6 +121,7 @@ def _enter_fits(plan: Plan, scene: Scene, k: int, now: Poses, first: int) -> Arr
 
     An error across a fit is left as far as its play allows: with the covariance S of the residuals y of the contact
     equations and R of their play, G = S (S + R)^-1 of y is taken away, and an error of covariance G R G^T is added.
+    Weight closes contacts with the floor of a fit, so that a part sinks by its play whatever y is.
 
     Args:
         k: The operation.
@@ -136,10 +143,15 @@ def _enter_fits(plan: Plan, scene: Scene, k: int, now: Poses, first: int) -> Arr
     off = [_compare(now[m.part], len(put)) - _compare(now[e.part], len(put)) for m, e in contacts]
     y = np.einsum("mi,mir->mr", J @ to_body, np.array(off)[equations.contact])
     plays = np.array([assembly.play(contact, 1e-3 * scene.clearance_mm) for contact in contacts])
-    R = np.diag(plays[equations.contact] ** 2 / 3.0)  # of a uniform distribution
-    G = np.linalg.pinv(J) @ (y @ y.T) @ np.linalg.pinv(y @ y.T + R, hermitian=True)
+    play = plays[equations.contact]
+    upward = J[:, :3] @ put[0, 2, :3]
+    pressed = np.abs(upward) > _LEVEL
+    R = np.diag(np.where(pressed, 0.0, play**2 / 3.0))  # of a uniform distribution
+    S = y @ y.T + np.diag(np.where(pressed, _FAR_M**2, 0.0))
+    G = np.linalg.pinv(J) @ S @ np.linalg.pinv(S + R, hermitian=True)
     moved = -G @ y
-    U, sizes, _ = np.linalg.svd(G @ np.sqrt(R), full_matrices=False)
+    sinks = G @ np.where(pressed, play * upward, 0.0)
+    U, sizes, _ = np.linalg.svd(np.column_stack([G @ np.sqrt(R), sinks]), full_matrices=False)
     moved[:, first : first + len(sizes)] += U * sizes
     return np.asarray(moved)
 
