@@ -1,8 +1,8 @@
 """Compute where a robot with errors places the parts of a plan, by geometry without physics.
 
-The tip deviates by the errors of the robot, but it is as level as planned. When the gripper closes, its pads centre the
-part between them and turn it partly towards them. All other errors remain in the hand. A released part comes to rest on
-its supports and sides. If the gripper then closes on it once more, across, the part is centred there, too.
+The tip deviates by the errors of the robot. When the gripper closes, its pads centre the part between them and turn it
+partly towards them. All other errors remain in the hand. A released part comes to rest on its supports and sides. If the
+gripper then closes on it once more, across, the part is centred there, too.
 """
 
 import math
@@ -16,7 +16,6 @@ from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.rest_poses import predict_rest_poses
 from apo_bench.simulation.execution import (
-    Grip,
     Move,
     Transfer,
     compute_transferred_poses,
@@ -24,7 +23,6 @@ from apo_bench.simulation.execution import (
     solve_key_angles,
 )
 from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
-from apo_bench.simulation.execution.transfer import is_tilted
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.trial_stages import robot_error_of
@@ -89,14 +87,14 @@ def bring(scene: Scene, move: Move, error: RobotError, T_part: Array) -> Array:
     """
     t = move.transfer
     held = pose.exp(_KEPT * twist_in_open_hand(scene, t, error, T_part))
-    last = _level(t.grips[-1], t.T_world_start, error) @ error.pads
+    last = t.grips[-1].T_part_tip @ error.pads
     released = _tip_displacement(scene, t, -1, error) @ t.T_world_goal @ last
     return np.asarray(released @ error.in_hand[move.step.operation] @ held @ pose.inverse(last))
 
 
 def twist_in_open_hand(scene: Scene, t: Transfer, error: RobotError, T_part: Array) -> Array:
     """Twist of the part in the frame of the tip before the pads close, (*, 6), [m, rad]; arguments as for `bring`."""
-    grip = _level(t.grips[0], t.T_world_start, error) @ error.pads
+    grip = t.grips[0].T_part_tip @ error.pads
     tip = _tip_displacement(scene, t, _PICK, error) @ t.T_world_start @ grip
     return np.asarray(pose.log(pose.inverse(tip) @ T_part @ grip))
 
@@ -115,7 +113,7 @@ def place_part(plan: Plan, scene: Scene, move: Move, error: RobotError, put: Arr
         return now
     rest = predict_rest_poses(plan.assembly, operation, now)
     for each in t.centring:
-        grip = _level(each, t.T_world_goal, error) @ error.pads
+        grip = each.T_part_tip @ error.pads
         tip = _tip_displacement(scene, t, -1, error) @ t.T_world_goal @ grip
         held = pose.exp(_KEPT * pose.log(pose.inverse(tip) @ rest[t.part] @ grip))
         now = compute_transferred_poses(operation, tip @ held @ pose.inverse(grip), rest)
@@ -145,25 +143,6 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
         left[move.step.operation] = pose.exp(slip)
     none = np.eye(4)
     return RobotError(none, np.zeros_like(error.joints), none, left)
-
-
-def _level(grip: Grip, T_part: Array, error: RobotError) -> Array:
-    """Pose of the tip in the frame of the part, (*, 4, 4), that a robot plans for a grip, where it estimates the part.
-
-    A robot knows where down is, so a hand that looks down is level whatever its hand-eye error.
-
-    Args:
-        T_part: Pose of the part without that error, (4, 4), world.
-    """
-    planned = T_part @ grip.T_part_tip
-    if is_tilted(planned):
-        return grip.T_part_tip
-    tip = error.hand_eye @ planned
-    z = planned[:3, 2]
-    x = tip[..., :3, 0] - (tip[..., :3, 0] @ z)[..., None] * z
-    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
-    R = np.stack([x, np.cross(z, x), np.broadcast_to(z, x.shape)], axis=-1)
-    return np.asarray(pose.inverse(error.hand_eye @ T_part) @ pose.rigid(R, tip[..., :3, 3]))
 
 
 def _tip_displacement(scene: Scene, t: Transfer, i: int, error: RobotError) -> Array:

@@ -19,7 +19,7 @@ from apo_bench.trial.trial_stages import LAYOUT, draw_robot_error, stream
 
 
 def test_a_robot_with_a_tilted_hand_eye_error_brings_a_part_to_where_it_is_predicted() -> None:
-    """The height is 0.3 mm off if the hand were as tilted as the error."""
+    """It would be 0.7 mm off if closing pads turned the part to them about both of their axes."""
     trial = 8000
     scene = build_scene(load_scenario("stick_in_tower"))
     layout = draw_layout(scene.scenario, stream(trial, LAYOUT), scene.clearance_mm)
