@@ -1,8 +1,8 @@
 """Compute where a robot with errors places the parts of a plan, by geometry without physics.
 
 The tip deviates by the errors of the robot. When the gripper closes, its pads centre the part between them and turn it
-partly towards them. All other errors remain in the hand. A released part comes to rest on its supports and sides. If the
-gripper then closes on it once more, across, the part is centred there, too.
+partly towards them. All other errors remain in the hand. A released part comes to rest on its supports and sides. If
+the gripper then closes on it once more, across, the part is centred there, too.
 """
 
 import math
