@@ -9,11 +9,11 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation, Outcome, Plan, ReachedState, Snapshot, compute_placements
 from apo_bench.envs.robot import RobotSettings
-from apo_bench.envs.stated_error import RobotErrors, correlate_plan, state_relative_error
+from apo_bench.envs.stated_error import correlate_plan, state_relative_error
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.perception.observation.noise import Noise
-from apo_bench.records import NO_ROBOT_ERROR, parse_robot_error
+from apo_bench.records import NO_ROBOT_ERROR
 from apo_bench.simulation.execution import plan_moves
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
@@ -122,10 +122,9 @@ class TrialStarts(NamedTuple):
         Args:
             probes: Whether the robot probes.
         """
-        sigmas = parse_robot_error(self.robot.assumed or NO_ROBOT_ERROR)
-        errors = RobotErrors(self.scene, sigmas, len(plan.target_poses))
+        assumed = self.robot.assumed or NO_ROBOT_ERROR
         moves = plan_moves(plan, self.scene, True, probes)
-        return state_relative_error(errors, plan, moves, start.operation, start.grip, joint)
+        return state_relative_error(assumed, plan, self.scene, moves, start.operation, start.grip, joint)
 
     def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:
         """Return the start of the next operation after one is done, or the outcome that ended the trial before it."""

@@ -1,7 +1,8 @@
 """The card of a data set: a `README.md` with fields, episodes and metadata."""
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, final
@@ -89,16 +90,25 @@ _CITATION = (
 )
 
 
-def write_card(
-    about: DatasetMetadata, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]
-) -> None:
-    """Write the card `README.md`: every field with its unit and frame, the licence, the command.
+def count_outcomes(episodes: Iterable[Mapping[str, Any]]) -> Counter[str]:
+    """Return how many episodes ended with each outcome code, `ok` for a success.
 
     Args:
-        counted: Number of episodes, and number of successes.
+        episodes: Their rows of the table of episodes.
+    """
+    return Counter(str(each.get("code") or each.get("failure_code") or "ok") for each in episodes)
+
+
+def write_card(
+    about: DatasetMetadata, out: Path, outcomes: Counter[str], tables: Mapping[str, Mapping[str, Any]]
+) -> None:
+    """Write the card `README.md`: every field with its unit and frame, the outcomes, the licence, the command.
+
+    Args:
+        outcomes: Outcome code -> number of episodes.
         tables: Pattern of files -> column -> its `Field`, or its meaning in words.
     """
-    trials = f"{format_count(counted[0], 'simulated trial')}, {counted[1]} right"
+    trials = f"{format_count(outcomes.total(), 'simulated trial')}, {outcomes['ok']} right"
     summary = f"{trials}, made by apo_bench {__version__} with MuJoCo"
     lerobot = "LeRobot, " if any(pattern.startswith("meta/") for pattern in tables) else ""
     lines = [
@@ -117,6 +127,8 @@ def write_card(
         ),
         "an evaluation, a track or a sweep, whose numbers are smaller.",
     ]
+    lines += ["", "## Outcomes", "", "| code | episodes | share |", "|---|--:|--:|"]
+    lines += [f"| `{code}` | {n} | {n / outcomes.total():.0%} |" for code, n in outcomes.most_common()]
     if about.arguments:
         lines += ["", "## Environment", "", "| argument | value |", "|---|---|"]
         lines += [f"| `{name}` | `{value!r}` |" for name, value in about.arguments.items()]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, write_card
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, count_outcomes, write_card
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
@@ -199,9 +199,9 @@ def write_parquet(found: Iterable[ReplayEpisode], about: DatasetMetadata, out: P
             write_columns([*FRAMES], columns, out / "frames" / f"{k:06}.parquet")
     columns = [[each[name] for each in episodes] for name in EPISODES]
     write_columns([*EPISODES], columns, out / "episodes.parquet", KINDS)
-    counted = len(episodes), sum(bool(each["success"]) for each in episodes)
-    write_card(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
-    return counted
+    outcomes = count_outcomes(episodes)
+    write_card(about, out, outcomes, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
+    return outcomes.total(), outcomes["ok"]
 
 
 def describe_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMetadata:

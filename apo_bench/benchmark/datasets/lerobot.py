@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, write_card
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, count_outcomes, write_card
 from apo_bench.benchmark.datasets.episode_videos import VIDEO_PATH, EpisodeVideos
 from apo_bench.benchmark.datasets.episodes import KINDS
 from apo_bench.benchmark.datasets.lerobot_statistics import compute_statistics
@@ -109,14 +109,14 @@ def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, o
     if not episodes:
         return 0, 0
     _write_meta(out, about, fields, schema, tasks, episodes, frames, videos)
-    counted = len(episodes), sum(bool(each["success"]) for each in episodes)
+    outcomes = count_outcomes(episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
     of_episodes = {**_OF_EPISODE, **about.episodes}
     tables: dict[str, Mapping[str, Any]] = {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes}
     if videos.features:
         tables["videos/*/*/*.mp4"] = dict.fromkeys(videos.features, "image of each frame")
-    write_card(about, out, counted, tables)
-    return counted
+    write_card(about, out, outcomes, tables)
+    return outcomes.total(), outcomes["ok"]
 
 
 def _list_columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> dict[str, Array]:

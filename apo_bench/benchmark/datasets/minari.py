@@ -5,14 +5,14 @@ with the observation before the first action and after each, and a file with the
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEpisode, write_card
+from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEpisode, count_outcomes, write_card
 from apo_bench.errors import missing_package
 from apo_bench.io import replace_file, write_file
 
@@ -56,16 +56,16 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
     h5py = load_h5py()
     folder = out / "data"
     folder.mkdir(parents=True)
-    steps = right = episodes = 0
+    steps = 0
+    ends: list[Mapping[str, Any]] = []
     with replace_file(folder / "main_data.hdf5") as file, h5py.File(file, "w", track_order=True) as data:
         for rollout in rollouts:
-            _write_episode(data.create_group(f"episode_{episodes}"), rollout, episodes)
-            episodes += 1
+            _write_episode(data.create_group(f"episode_{len(ends)}"), rollout, len(ends))
+            ends.append(rollout.more)
             steps += len(rollout.actions)
-            right += bool(rollout.more["success"])
     metadata = {
         "dataset_id": f"apo_bench/{about.name}-v0",
-        "total_episodes": episodes,
+        "total_episodes": len(ends),
         "total_steps": steps,
         "dataset_size": round((folder / "main_data.hdf5").stat().st_size / 1e6, 1),
         "data_format": "hdf5",
@@ -89,8 +89,9 @@ def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, ou
         f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN, **robot},
         f"{where}: attributes of each": {**_OF_EPISODE, **about.episodes},
     }
-    write_card(about, out, (episodes, right), tables)
-    return episodes, right
+    outcomes = count_outcomes(ends)
+    write_card(about, out, outcomes, tables)
+    return outcomes.total(), outcomes["ok"]
 
 
 def _write_episode(group: Any, rollout: RecordedEpisode, episode: int) -> None:

@@ -14,6 +14,7 @@ from pyarrow import parquet
 
 from apo_bench import TrialConfig, load_scenario, run_trial
 from apo_bench.benchmark.datasets import trial_dataset
+from apo_bench.benchmark.datasets.card import count_outcomes
 from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, record_replays
 from apo_bench.benchmark.datasets.trial_dataset import make_dataset
 from apo_bench.cli.app import main
@@ -71,6 +72,12 @@ def test_frames_end_where_the_replay_did(made: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(np.reshape(frames[70]["part_poses"], (-1, 7))[:, 3:], axis=1), 1.0)
 
 
+def test_outcomes_are_counted_by_code_and_no_failure_is_a_success() -> None:
+    replays = [{"failure_code": None}, {"failure_code": "gap"}, {"failure_code": "gap"}]
+    assert count_outcomes(replays) == {"ok": 1, "gap": 2}
+    assert count_outcomes([{"code": "ok"}, {"code": "force_stop"}]) == {"ok": 1, "force_stop": 1}
+
+
 def test_the_card_says_what_every_column_is(made: Path) -> None:
     card = (made / "README.md").read_text(encoding="utf-8")
     assert set(parquet.read_schema(made / "episodes.parquet").names) == EPISODES.keys()
@@ -81,6 +88,7 @@ def test_the_card_says_what_every_column_is(made: Path) -> None:
         assert f"| `{column}` | " in card
         assert f"| {field.unit} | {field.frame} | {field.meaning} |" in card
     assert "2 simulated trials, 2 right" in card
+    assert "| `ok` | 2 | 100% |" in card
     assert "Licence: Apache-2.0" in card
 
 
