@@ -29,7 +29,7 @@ _CARRIES = 1e-3
 _SAME = 1e-6  # directions whose cosine differs from 1 by less are equal
 _SEAT = 0.5
 """A face ends an insertion if the cosine of its normal with the opposite of the direction is at least this."""
-_MOST_SETS = 30
+_MOST_SETS = 100
 """The search ends after this number of sets of parts without an order."""
 _LARGEST_GROUP = 4  # parts in a sub-assembly
 _CARRIED = 3
