@@ -142,7 +142,7 @@ def import_solid(
         try:
             path, solid = _write_checked(name, replace(body, moments=moments), folder, stated, refused)
             break
-        except InputError as error:
+        except _FaultyPart as error:
             fault = error
     else:  # no moments gave a part that could be read
         raise InputError(
@@ -150,6 +150,10 @@ def import_solid(
         ) from fault
     free = {wall.name: 1e3 * _measure_free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return ImportedPart(path, raw, solid, pieces, refused, shares, free)
+
+
+class _FaultyPart(Exception):
+    """A written part whose shape for collisions does not agree with the solid."""
 
 
 def _write_checked(
@@ -162,7 +166,8 @@ def _write_checked(
         refused: Gets the omitted faces with the reason.
 
     Raises:
-        InputError: The part cannot be read back, as its shape for collisions does not agree with the solid.
+        InputError: The part cannot be written.
+        _FaultyPart: It cannot be read back.
     """
     while True:
         path = write_part(name, body, folder, **stated)
@@ -172,7 +177,7 @@ def _write_checked(
             path.unlink()
             path.with_suffix(".toml").unlink(missing_ok=True)
             if not isinstance(error, FaceError):
-                raise
+                raise _FaultyPart from error
             refused[error.face] = error.reason
             body = _remove_faces(body, {error.face})
 
