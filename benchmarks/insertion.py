@@ -28,7 +28,7 @@ BEGIN = "<!-- table: python -m benchmarks.insertion -->"
 END = "<!-- end of table -->"
 SCENARIOS = ("stick_in_tower", "dovetail", "peg_in_hole", "shaft_through_brackets", "l_bracket_on_plate")
 POLICIES = ("straight", "spiral", "searcher", "probe")
-FIRST = 900
+FIRST = 1000
 COLUMNS = ("scenario", "policy", "trial", "success", "reason", "code", "actions", "deepest_mm", "peak_force_n")
 NOT_BEGUN = "not begun"
 """In place of a reason: the trial fails before the operation."""
