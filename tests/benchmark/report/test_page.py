@@ -105,7 +105,7 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         assert lines.nth(3).locator("code").inner_text() == want
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         lines.nth(3).locator("button.copy").click()
-        page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
+        page.locator("button.copy", has_text="copied").first.wait_for()
         assert page.evaluate("navigator.clipboard.readText()") == want
         page.locator(".trials input").check()
         failed = [r for r in rows() if (r["method"], r["noise_mm"], r["success"]) == ("paper", 2.0, False)]
