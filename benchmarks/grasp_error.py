@@ -2,7 +2,7 @@
 
 A robot with the default hand-eye error picks each part of generated assemblies, which no table of the documentation
 has, from its start. Printed for each number of the twist of the part in the frame of the tip, whose first axis is the
-closing direction: the share that is left after closing (`_KEPT` of `robot_draws`), and what closing adds per mm that
+closing direction: the share that is left after closing (`KEPT` of `robot_draws`), and what closing adds per mm that
 the pads push the part (`_DRAGGED` of `stated_error`). The tilt about the second axis is that of a part of 1 N, since
 heavy parts tilt less.
 """

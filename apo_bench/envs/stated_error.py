@@ -25,7 +25,7 @@ from apo_bench.planning.prediction.rest_poses import is_insertion
 from apo_bench.simulation.execution import Grip, Move, compute_transferred_poses
 from apo_bench.simulation.robot import RobotError, translate
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.robot_draws import bring, list_unit_errors, place_part, stack_errors, twist_in_open_hand
+from apo_bench.trial.robot_draws import KEPT, bring, list_unit_errors, place_part, stack_errors, twist_in_open_hand
 
 _DRAGGED = np.array([0.023, 0.038, 0.085, *np.radians([18.0, 50.0, 105.0])])
 """What a grasp adds to the twist of a part in the hand, (6,), 1 sigma, for each metre that the pads push it, [m/m,
@@ -100,13 +100,13 @@ def _propagate(robot_error: str, plan: Plan, scene: Scene, moves: Sequence[Move]
         pushed = np.linalg.norm((before - before[0])[: 1 + len(units), 0])
         dragged = pushed * _DRAGGED / [1.0, 1.0, 1.0, 1.0, move.transfer.weight_n, 1.0]
         error.in_hand[k, first : first + 6] = pose.exp(np.diag(dragged))
-        put = bring(scene, move, error, resting[move.transfer.part])
+        put = bring(scene, move, error, KEPT * before)
         now = compute_transferred_poses(plan.assembly.operations[k], put, resting)
         if move is moves[-1]:
             return {part: _compare(T, len(put)) for part, T in now.items()}
         if not move.step.undo:
             put = put @ pose.exp(_enter_fits(plan, scene, k, now, first + 6).T)
-        resting = place_part(plan, scene, move, error, put, resting)
+        resting = place_part(plan, scene, move, error, put, resting, KEPT)
     raise AssertionError("a plan has moves")
 
 

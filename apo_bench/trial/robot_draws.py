@@ -73,7 +73,8 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     resting = plan.start
     states = list[Poses]()
     for move in plan_moves(plan, scene, spiral):
-        put = bring(scene, move, error, resting[move.transfer.part], _FLAT)
+        twist = _FLAT * twist_in_open_hand(scene, move.transfer, error, resting[move.transfer.part])
+        put = bring(scene, move, error, twist)
         if not move.step.undo:
             floats = pose.at(move.transfer.floats * _UP) if move.transfer.into.level else np.eye(4)
             operation = plan.assembly.operations[move.step.operation]
@@ -82,36 +83,38 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     return tuple(states)
 
 
-def bring(scene: Scene, move: Move, error: RobotError, T_part: Array, kept: Array = KEPT) -> Array:
+def bring(scene: Scene, move: Move, error: RobotError, twist: Array) -> Array:
     """Pose of the part of a move where the robot releases it, (*, 4, 4), world.
 
     Args:
-        T_part: Its pose before, (*, 4, 4), world.
-        kept: Share of its twist in the open hand that is left when the pads have closed, (6,).
+        twist: Of the part in the frame of the tip once the pads have closed, (*, 6), [m, rad].
     """
     t = move.transfer
-    held = pose.exp(kept * twist_in_open_hand(scene, t, error, T_part))
     last = t.grips[-1].T_part_tip @ error.pads
     released = _tip_displacement(scene, t, -1, error) @ t.T_world_goal @ last
-    return np.asarray(released @ error.in_hand[move.step.operation] @ held @ pose.inverse(last))
+    return np.asarray(released @ error.in_hand[move.step.operation] @ pose.exp(twist) @ pose.inverse(last))
 
 
 def twist_in_open_hand(scene: Scene, t: Transfer, error: RobotError, T_part: Array) -> Array:
-    """Twist of the part in the frame of the tip before the pads close, (*, 6), [m, rad]; arguments as for `bring`."""
+    """Twist of the part of a transfer in the frame of the tip before the pads close, (*, 6), [m, rad].
+
+    Args:
+        T_part: Pose of the part, (*, 4, 4), world.
+    """
     grip = t.grips[0].T_part_tip @ error.pads
     tip = _tip_displacement(scene, t, _PICK, error) @ t.T_world_start @ grip
     return np.asarray(pose.log(pose.inverse(tip) @ T_part @ grip))
 
 
 def place_part(
-    plan: Plan, scene: Scene, move: Move, error: RobotError, put: Array, resting: Poses, kept: Array = KEPT
+    plan: Plan, scene: Scene, move: Move, error: RobotError, put: Array, resting: Poses, kept: Array
 ) -> Poses:
     """Poses of all parts at rest after a move.
 
     Args:
         put: Where the robot releases the part, (*, 4, 4), world.
         resting: All poses before.
-        kept: As for `bring`.
+        kept: Share of a twist in the open hand that is left once the pads have closed, (6,).
     """
     t = move.transfer
     operation = plan.assembly.operations[move.step.operation]
@@ -119,9 +122,12 @@ def place_part(
     if move.step.undo:
         return now
     rest = predict_rest_poses(plan.assembly, operation, now)
+    if not t.centring:
+        return rest
+    let_go = _tip_displacement(scene, t, -1, error) @ t.T_world_goal
     for each in t.centring:
         grip = each.T_part_tip @ error.pads
-        tip = _tip_displacement(scene, t, -1, error) @ t.T_world_goal @ grip
+        tip = let_go @ grip
         held = pose.exp(kept * pose.log(pose.inverse(tip) @ rest[t.part] @ grip))
         now = compute_transferred_poses(operation, tip @ held @ pose.inverse(grip), rest)
         rest = predict_rest_poses(plan.assembly, operation, now)

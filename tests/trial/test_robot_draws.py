@@ -14,7 +14,7 @@ from apo_bench.simulation.execution import ExecutionConfig, plan_moves
 from apo_bench.simulation.robot import translate
 from apo_bench.simulation.task.start import prepare_start
 from apo_bench.simulation.task.tip_control import TipControl
-from apo_bench.trial.robot_draws import bring, list_unit_errors
+from apo_bench.trial.robot_draws import KEPT, bring, list_unit_errors, twist_in_open_hand
 from apo_bench.trial.trial_stages import LAYOUT, draw_robot_error, stream
 
 
@@ -34,7 +34,7 @@ def test_a_robot_with_a_tilted_hand_eye_error_brings_a_part_to_where_it_is_predi
         start = prepare_start(plan, scene, 2, ExecutionConfig(robot_error=error), ("ideal", (trial,)))
         assert not isinstance(start, Outcome)
         true.append(TipControl(scene, start, np.random.default_rng(0)).poses()[t.part])
-        predicted.append(bring(scene, move, error, plan.start[t.part]))
+        predicted.append(bring(scene, move, error, KEPT * twist_in_open_hand(scene, t, error, plan.start[t.part])))
     moved, expected = (pose.log(pose.inverse(before) @ after) for before, after in (true, predicted))
     assert np.linalg.norm(expected[:3]) > 2e-4
     np.testing.assert_allclose(moved[:3], expected[:3], atol=6e-5)  # closing fingers turn it by some 0.02 degrees
