@@ -130,14 +130,14 @@ class Searcher:
             return -1.0
         if abs(deeper) > _AGAIN_MM:
             self._held = _HOLE_MM < deeper < math.inf
-            self._first = self._middle = self._aim = self._tip
-            self._angle = 0.0
-            self._searches = 0
             self._dipped = False
+            self._searches = 0
+            self._angle = 0.0
+            self._begin_here()
         elif deeper > _DIPPED_MM:
             self._dipped = True
-            self._first = self._middle = self._aim = self._tip
             self._begin_ellipse()
+            self._begin_here()
         self._phase = self._search
         self._stopped = self._left
         self._press = max(self._push, 0.1)
@@ -163,7 +163,7 @@ class Searcher:
         self._rested += 1
         if self._rested > _REST and not 0 < self._calm < _CALM:
             self._rested = 0
-            if not self._held and math.hypot(*self._side) > self._friction + _WALL_N:
+            if not self._held and self._is_fixed:
                 self._begin_turned()
             self._step(deviations)
         return 0.0
@@ -177,6 +177,15 @@ class Searcher:
     def _friction(self) -> float:
         """Greatest side force that friction explains, [N]."""
         return _FRICTION * max(self._push, 0.0)
+
+    @property
+    def _is_fixed(self) -> bool:
+        """Whether walls hold the part in place."""
+        return math.hypot(*self._side) > self._friction + _WALL_N
+
+    def _begin_here(self) -> None:
+        """Search about the tip as it is."""
+        self._first = self._middle = self._aim = self._tip
 
     def _begin_turned(self) -> None:
         """Search again from the beginning with another turn, since walls hold the part, which does not go in."""
@@ -202,7 +211,7 @@ class Searcher:
         aim = self._middle + self._angle / whole * aside
         if self._follows_force:
             self._target[:2] += aim - self._aim
-        elif math.hypot(*self._side) < self._friction + _WALL_N:
+        elif not self._is_fixed:
             ahead = aim - self._tip
             self._target[:2] += ahead * min(1.0, _LONGEST_MM / max(math.hypot(*ahead), _LONGEST_MM))
         self._aim = aim
