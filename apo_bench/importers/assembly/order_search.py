@@ -59,6 +59,8 @@ class Placement(NamedTuple):
     """Whether only fasteners, which are no parts, hold the main part."""
     along: Array | None = None
     """Direction of insertion to state, frame of the main part, (3,); None: the planner's own choice."""
+    from_above: bool = True
+    """Whether the main part comes nearly straight down."""
 
 
 def _always(part: str, there: Sequence[str]) -> bool:
@@ -161,7 +163,7 @@ class OrderSearch:
         return (
             -self.wanted.index(part) if part in self.wanted else 0,
             not self.has_room(part, sorted(there)),
-            "from above" not in placing.why,
+            not placing.from_above,
             -round(low + float(self.poses[part][2, 3]), 4),
             self.solids[part].volume,
         )
@@ -199,10 +201,11 @@ class OrderSearch:
             return RemovalObstacle(3, f"'{main}' cannot leave {others}")
         way = poses[main][:3, :3] @ arrival.line.direction  # direction of insertion, world
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
-        direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
+        from_above = bool(way[2] < -0.9)
+        direction = "from above" if from_above else "from below" if way[2] > 0.9 else along
         stated = None if falls is None else arrival.line.direction
         why = f"comes {direction}, onto {others}"
-        return Placement(tuple(moves), contacts, poses[main], why, falls is not None, stated)
+        return Placement(tuple(moves), contacts, poses[main], why, falls is not None, stated, from_above)
 
     def _find_fall(
         self, moves: Sequence[str], rest: Sequence[str], contacts: tuple[Contact, ...], assembly: Assembly, others: str

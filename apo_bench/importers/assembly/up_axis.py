@@ -76,7 +76,7 @@ def _try_axes(parts: Sequence[PosedPart], choices: AssemblyChoices) -> NewScenar
 def _list_hindrances(scenario: NewScenario) -> tuple[Collection[str], ...]:
     """Return the notes on parts that cannot be grasped, those on parts that do not come from above, and the parts that
     start in a fixture."""
-    aside = [f"'{placing.moves[0]}' {placing.why}" for placing in scenario.order if "from above" not in placing.why]
+    aside = [f"'{placing.moves[0]}' {placing.why}" for placing in scenario.order if not placing.from_above]
     return scenario.unfit, aside, scenario.fixtures
 
 
