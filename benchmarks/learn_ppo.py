@@ -83,7 +83,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", default="stick_in_tower")
     parser.add_argument("--noise-level", type=float, default=0.25)
-    parser.add_argument("--steps", type=int, default=30_000, help="decisions of the policy in training (30000)")
+    parser.add_argument("--steps", type=int, default=18_432, help="decisions of the policy in training (18432)")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
 

@@ -49,7 +49,6 @@ keeps the counts. Success: the finished assembly is right. All rows have the sam
 Every trial draws its own [named errors](../guide/robot-error.md#errors-of-the-robot), in standard deviations, and the
 robot assumes these. Unnamed errors are fixed: the script changes the simulated robot, and `contact+probe` assumes
 `unknown`. Heights count over the targets; those of an arm that sags grow with its reach.
-
 """
 NAMED = (
     *("none", "hand_eye:1/0.2", "joints:0.05", "tool:0.5", "in_hand:0.5/1"),
